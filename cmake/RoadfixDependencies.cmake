@@ -1,0 +1,61 @@
+# What Roadfix takes from the system. Each missing package is named by its Debian name; scripts/setup installs them all.
+macro(roadfix_require FOUND PACKAGE)
+  if(NOT ${FOUND})
+    message(FATAL_ERROR "Roadfix needs the Debian package ${PACKAGE}: run scripts/setup, or apt-get install ${PACKAGE}")
+  endif()
+endmacro()
+
+find_package(Eigen3 3.4 QUIET CONFIG)
+roadfix_require(Eigen3_FOUND libeigen3-dev)
+
+# Newer releases of LCM bring a CMake package; Debian 12's 1.3.1 only a pkg-config file, which itself needs glib's.
+find_package(lcm QUIET CONFIG)
+if(lcm_FOUND)
+  add_library(roadfix_lcm INTERFACE)
+  target_link_libraries(roadfix_lcm INTERFACE lcm::lcm)
+else()
+  find_package(PkgConfig QUIET)
+  roadfix_require(PkgConfig_FOUND pkg-config)
+  pkg_check_modules(GLIB2 QUIET glib-2.0)
+  roadfix_require(GLIB2_FOUND libglib2.0-dev)
+  pkg_check_modules(LCM QUIET IMPORTED_TARGET lcm)
+  roadfix_require(LCM_FOUND liblcm-dev)
+  add_library(roadfix_lcm INTERFACE)
+  target_link_libraries(roadfix_lcm INTERFACE PkgConfig::LCM)
+endif()
+find_program(LCM_GEN lcm-gen)
+roadfix_require(LCM_GEN liblcm-bin)
+
+list(APPEND CMAKE_MODULE_PATH /usr/share/cmake/geographiclib)
+find_package(GeographicLib QUIET MODULE)
+roadfix_require(GeographicLib_FOUND libgeographiclib-dev)
+
+find_package(yaml-cpp QUIET CONFIG)
+roadfix_require(yaml-cpp_FOUND libyaml-cpp-dev)
+find_package(nlohmann_json QUIET CONFIG)
+roadfix_require(nlohmann_json_FOUND nlohmann-json3-dev)
+find_package(CLI11 QUIET CONFIG)
+roadfix_require(CLI11_FOUND libcli11-dev)
+find_package(fmt QUIET CONFIG)
+roadfix_require(fmt_FOUND libfmt-dev)
+find_package(ZLIB QUIET)
+roadfix_require(ZLIB_FOUND zlib1g-dev)
+find_package(Threads REQUIRED)
+
+find_package(OpenCV QUIET CONFIG COMPONENTS core imgproc imgcodecs features2d calib3d video dnn videoio)
+roadfix_require(OpenCV_FOUND libopencv-dev)
+
+if(ROADFIX_TESTS)
+  find_package(Catch2 2.13 QUIET CONFIG)
+  roadfix_require(Catch2_FOUND catch2)
+  include(Catch)
+  find_package(benchmark QUIET CONFIG)
+  roadfix_require(benchmark_FOUND libbenchmark-dev)
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  # The sloppiness is what ccache asks for where precompiled headers are in use.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env
+    CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime CCACHE_NOHASHDIR=1 CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} ${CCACHE})
+endif()

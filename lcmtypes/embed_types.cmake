@@ -1,0 +1,10 @@
+# Writes OUT, a C++ source with the text of every .lcm file in SOURCES (type_text.h declares it).
+set(CODE "#include \"type_text.h\"\n\nnamespace roadfix {\n\nconst std::vector<TypeText>& type_texts() {\n  static const std::vector<TypeText> kTexts = {\n")
+foreach(SOURCE IN LISTS SOURCES)
+  get_filename_component(NAME ${SOURCE} NAME_WE)
+  string(REGEX REPLACE "^roadfix_" "" NAME ${NAME})
+  file(READ ${SOURCE} CONTENT)
+  string(APPEND CODE "      {\"${NAME}\", R\"LCMTYPE(${CONTENT})LCMTYPE\"},\n")
+endforeach()
+string(APPEND CODE "  };\n  return kTexts;\n}\n\n}  // namespace roadfix\n")
+file(WRITE ${OUT} "${CODE}")
