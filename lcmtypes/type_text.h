@@ -1,4 +1,5 @@
-/// The text of every lcmtypes/roadfix_*.lcm file, embedded: the bus walks messages by it, the recorder puts it beside its logs.
+/// The text of every lcmtypes/roadfix_*.lcm file, embedded: the bus walks messages by it, the recorder puts it beside
+/// its logs.
 #pragma once
 
 #include <string>

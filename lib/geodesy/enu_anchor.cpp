@@ -9,7 +9,8 @@ namespace roadfix {
 
 Eigen::Vector3d ecef_from_geodetic(const Geodetic& g) {
   Eigen::Vector3d p;
-  GeographicLib::Geocentric::WGS84().Forward(g.latitude / kDegree, g.longitude / kDegree, g.height, p.x(), p.y(), p.z());
+  GeographicLib::Geocentric::WGS84().Forward(g.latitude / kDegree, g.longitude / kDegree, g.height, p.x(), p.y(),
+                                             p.z());
   return p;
 }
 

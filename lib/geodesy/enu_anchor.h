@@ -18,8 +18,8 @@ Geodetic geodetic_from_ecef(const Eigen::Vector3d& p_ecef);
 /// Rotation of the axes east, north, up at g into ECEF. At the poles east is that of g's longitude.
 Eigen::Matrix3d R_ecef_enu(const Geodetic& g);
 
-/// Fixed tangent frame: origin and axes at the anchor. Exact at any distance (no flat-Earth approximation); z leaves the local vertical by
-/// distance / Earth radius.
+/// Fixed tangent frame: origin and axes at the anchor. Exact at any distance (no flat-Earth approximation); z leaves
+/// the local vertical by distance / Earth radius.
 class EnuAnchor {
  public:
   explicit EnuAnchor(const Geodetic& anchor);

@@ -1,5 +1,6 @@
-/// Normal gravity of the WGS84 ellipsoid with height, and the Earth's rotation. GeographicLib's NormalGravity; no gravity model files.
-/// What is left out is the gravity disturbance: up to about 50 mGal = 5e-4 m/s2, deflection of the vertical up to about 10 arcsec = 5e-4 m/s2.
+/// Normal gravity of the WGS84 ellipsoid with height, and the Earth's rotation. GeographicLib's NormalGravity; no
+/// gravity model files. What is left out is the gravity disturbance: up to about 50 mGal = 5e-4 m/s2, deflection of the
+/// vertical up to about 10 arcsec = 5e-4 m/s2.
 #pragma once
 
 #include <Eigen/Dense>

@@ -5,7 +5,8 @@
 namespace roadfix {
 namespace {
 
-/// cos(pitch) below which roll and yaw are no longer told apart: 1e-9 rad from the pole, where their difference is lost to rounding.
+/// cos(pitch) below which roll and yaw are no longer told apart: 1e-9 rad from the pole, where their difference is lost
+/// to rounding.
 constexpr double kGimbalLock = 1e-9;
 
 }  // namespace
@@ -18,7 +19,8 @@ YawPitchRoll yaw_pitch_roll(const Eigen::Matrix3d& R) {
     a.yaw = std::atan2(R(1, 0), R(0, 0));
     a.roll = std::atan2(R(2, 1), R(2, 2));
   } else {
-    // With roll = 0 the middle column is (-sin yaw, cos yaw, 0) at either pole. The papers' (13-a), (13-b) differ from each other only by letters.
+    // With roll = 0 the middle column is (-sin yaw, cos yaw, 0) at either pole. The papers' (13-a), (13-b) differ from
+    // each other only by letters.
     a.yaw = std::atan2(-R(0, 1), R(1, 1));
     a.roll = 0.0;
   }

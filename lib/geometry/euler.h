@@ -1,5 +1,5 @@
-/// Yaw, pitch, roll of ISO 8855: R = Rz(yaw) Ry(pitch) Rx(roll), body (x forward, y left, z up) to a level frame with z up.
-/// Yaw counterclockwise from the level frame's x, pitch positive nose *down*, roll positive right side down.
+/// Yaw, pitch, roll of ISO 8855: R = Rz(yaw) Ry(pitch) Rx(roll), body (x forward, y left, z up) to a level frame with z
+/// up. Yaw counterclockwise from the level frame's x, pitch positive nose *down*, roll positive right side down.
 #pragma once
 
 #include <Eigen/Dense>

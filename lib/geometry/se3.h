@@ -1,7 +1,7 @@
 /// Rigid transforms as a rotation and a translation; T_a_b takes coordinates of b to a (frames.h).
 ///
-/// Perturbation used everywhere in Roadfix: retract(T, d) with d = [translation in a's axes, rotation in b's axes]; this is the
-/// error that pose_t's covariance describes.
+/// Perturbation used everywhere in Roadfix: retract(T, d) with d = [translation in a's axes, rotation in b's axes];
+/// this is the error that pose_t's covariance describes.
 #pragma once
 
 #include <Eigen/Dense>

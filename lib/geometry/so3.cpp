@@ -54,8 +54,7 @@ Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& theta) {
 Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& theta) {
   const double a2 = theta.squaredNorm();
   const Eigen::Matrix3d S = skew(theta);
-  if (a2 < kSmallAngle * kSmallAngle)
-    return Eigen::Matrix3d::Identity() + 0.5 * S + (1.0 / 12.0 + a2 / 720.0) * S * S;
+  if (a2 < kSmallAngle * kSmallAngle) return Eigen::Matrix3d::Identity() + 0.5 * S + (1.0 / 12.0 + a2 / 720.0) * S * S;
   const double a = std::sqrt(a2);
   // (1 + cos a) / (2 a sin a) = cot(a/2) / (2 a), finite up to a = 2 pi.
   const double k = 1.0 / a2 - 1.0 / (2.0 * a * std::tan(0.5 * a));

@@ -1,6 +1,8 @@
-/// Rotations: exponential map, logarithm and their Jacobians (Sola, Deray, Atchuthan, A micro Lie theory, 2018, section 4.B and appendix B).
+/// Rotations: exponential map, logarithm and their Jacobians (Sola, Deray, Atchuthan, A micro Lie theory, 2018,
+/// section 4.B and appendix B).
 ///
-/// Convention: right perturbation, R * Exp(theta) with theta in the axes on the right; every Jacobian here is a right Jacobian.
+/// Convention: right perturbation, R * Exp(theta) with theta in the axes on the right; every Jacobian here is a right
+/// Jacobian.
 #pragma once
 
 #include <Eigen/Dense>

@@ -1,4 +1,5 @@
-/// The plain structs that every estimator takes. SI units, angles in rad, axes as in geometry/frames.h. t_us: microseconds since 1970-01-01 UTC.
+/// The plain structs that every estimator takes. SI units, angles in rad, axes as in geometry/frames.h. t_us:
+/// microseconds since 1970-01-01 UTC.
 #pragma once
 
 #include <Eigen/Dense>
@@ -43,7 +44,8 @@ struct GnssFix {
   std::optional<double> correction_age;  ///< s
 };
 
-/// Signed: the speeds carry their sign. Otherwise they are magnitudes, with the gear's direction where the car tells it.
+/// Signed: the speeds carry their sign. Otherwise they are magnitudes, with the gear's direction where the car tells
+/// it.
 enum class WheelDirection { kUnknown, kForward, kReverse, kSigned };
 
 struct WheelSample {
@@ -62,13 +64,14 @@ struct MagSample {
 /// How far an estimate may be trusted.
 enum class Validity { kInvalid, kCoasting, kValid };
 
-/// A pose with velocity and covariance in some frame: what estimators give, what the fusion takes, what the evaluation compares.
+/// A pose with velocity and covariance in some frame: what estimators give, what the fusion takes, what the evaluation
+/// compares.
 struct Odometry {
   int64_t t_us = 0;
   SE3 T_frame_vehicle;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s, of the vehicle's origin, vehicle axes
   Eigen::Vector3d angular_rate = Eigen::Vector3d::Zero();  ///< rad/s, vehicle axes
-  Matrix6d cov_pose = Matrix6d::Zero();                    ///< of retract(): position in frame, rotation in vehicle axes
+  Matrix6d cov_pose = Matrix6d::Zero();  ///< of retract(): position in frame, rotation in vehicle axes
   Eigen::Matrix3d cov_velocity = Eigen::Matrix3d::Zero();  ///< m2/s2, vehicle axes
   Validity validity = Validity::kInvalid;
 };

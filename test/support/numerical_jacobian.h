@@ -5,7 +5,8 @@
 
 namespace roadfix::test {
 
-/// d h / d d at d = 0, h from Cols to Rows reals. The default step balances rounding and truncation for values of size one.
+/// d h / d d at d = 0, h from Cols to Rows reals. The default step balances rounding and truncation for values of size
+/// one.
 template <int Rows, int Cols, typename Function>
 Eigen::Matrix<double, Rows, Cols> numerical_jacobian(const Function& h, double step = 1e-5) {
   Eigen::Matrix<double, Rows, Cols> J;

@@ -11,9 +11,9 @@ namespace roadfix {
 namespace {
 
 std::vector<Geodetic> places() {
-  return {{40.1 * kDegree, -105.1 * kDegree, 1600.0}, {0.0, 0.0, 0.0},
+  return {{40.1 * kDegree, -105.1 * kDegree, 1600.0},   {0.0, 0.0, 0.0},
           {89.9999999 * kDegree, 30.0 * kDegree, 10.0}, {-90.0 * kDegree, 0.0, 0.0},
-          {30.0 * kDegree, -180.0 * kDegree, 50.0}, {-33.0 * kDegree, 179.9999999 * kDegree, -20.0}};
+          {30.0 * kDegree, -180.0 * kDegree, 50.0},     {-33.0 * kDegree, 179.9999999 * kDegree, -20.0}};
 }
 
 TEST_CASE("ENU round trip, poles and date line included") {

@@ -10,8 +10,10 @@ namespace {
 
 TEST_CASE("normal gravity has the published values of WGS84") {
   // NIMA TR8350.2, table 3.4: 9.7803253359 at the equator, 9.8321849378 at the poles.
-  CHECK(-normal_gravity_enu(EnuAnchor({0.0, 0.0, 0.0}), Eigen::Vector3d::Zero()).z() == Approx(9.7803253359).epsilon(1e-9));
-  CHECK(-normal_gravity_enu(EnuAnchor({kPi / 2.0, 0.0, 0.0}), Eigen::Vector3d::Zero()).z() == Approx(9.8321849378).epsilon(1e-9));
+  CHECK(-normal_gravity_enu(EnuAnchor({0.0, 0.0, 0.0}), Eigen::Vector3d::Zero()).z() ==
+        Approx(9.7803253359).epsilon(1e-9));
+  CHECK(-normal_gravity_enu(EnuAnchor({kPi / 2.0, 0.0, 0.0}), Eigen::Vector3d::Zero()).z() ==
+        Approx(9.8321849378).epsilon(1e-9));
 }
 
 TEST_CASE("gravity falls by 3.086e-6 per metre of height and points down at the anchor") {

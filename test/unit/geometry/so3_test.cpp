@@ -13,7 +13,8 @@ namespace {
 
 /// Identity, tiny, twenty seeded, and near pi: where rotations are awkward.
 std::vector<Eigen::Vector3d> tangents() {
-  std::vector<Eigen::Vector3d> all = {Eigen::Vector3d::Zero(), {1e-8, -2e-8, 3e-9}, {1e-4, 0.0, 0.0}, {0.99e-4, 0.0, 0.0}};
+  std::vector<Eigen::Vector3d> all = {
+      Eigen::Vector3d::Zero(), {1e-8, -2e-8, 3e-9}, {1e-4, 0.0, 0.0}, {0.99e-4, 0.0, 0.0}};
   std::mt19937_64 generator(7);
   std::uniform_real_distribution<double> uniform(-1.7, 1.7);
   for (int i = 0; i < 20; ++i) all.emplace_back(uniform(generator), uniform(generator), uniform(generator));
