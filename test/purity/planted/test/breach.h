@@ -1,0 +1,1 @@
+inline unsigned seed() { return std::random_device{}(); }

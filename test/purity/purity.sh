@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Greps ROOT for what DESIGN.md (sections 3 and 5) and STYLE.md (section 8) forbid; prints each breach and fails with their number.
+#   purity.sh ROOT
+set -uo pipefail
+cd "$1" || exit 2
+order=(geometry statistics geodesy samples stream gnss_ins wheel camera features slam msckf fusion health evaluation simulation)
+estimators=' gnss_ins wheel slam msckf fusion '
+breaches=0
+
+# report WHY: counts and prints the lines on standard input, comments left out.
+report() {
+  local line
+  while IFS= read -r line; do
+    breaches=$((breaches + 1))
+    printf '%s: %s\n' "$1" "$line"
+  done < <(grep -vE '^[^:]+:[0-9]+: *//')
+}
+
+seen=' '
+for library in "${order[@]}"; do
+  seen+="$library "
+  [[ -d lib/$library ]] || continue
+  report 'an estimator library knows no bus, clock, file or environment' < <(grep -rnE --include='*.h' --include='*.cpp' \
+    -e '#include [<"](lcm/|roadfix/|yaml-cpp|chrono|ctime|time\.h|fstream|filesystem|iostream|cstdio|unistd\.h|sys/)' \
+    -e 'std::(cout|cerr|getenv|exit|chrono|random_device|filesystem|ofstream|ifstream|rand)\b' \
+    -e '^ *static [^(]*=[^=]*;' -e '\bassert\(' lib/"$library" | grep -vE 'static (constexpr|const) ')
+  while IFS=: read -r file number include; do
+    used=${include#*\"}; used=${used%%/*}
+    if [[ $seen != *" $used "* ]]; then
+      report "lib/$library may use only what stands above it" <<<"$file:$number:$include"
+    elif [[ $used != "$library" && $estimators == *" $used "* && $estimators == *" $library "* ]]; then
+      report 'no estimator knows another' <<<"$file:$number:$include"
+    fi
+  done < <(grep -rnE --include='*.h' --include='*.cpp' '#include "[a-z_]+/' lib/"$library")
+done
+
+report 'tests draw no unseeded random numbers' < <(grep -rnE --include='*.h' --include='*.cpp' \
+  -e 'std::random_device|\bs?rand\(' -e '(Matrix|Vector|Quaternion)[0-9X]*d?(<[^>]*>)?::(Unit)?Random\(' test 2>/dev/null | grep -v '^test/purity/')
+
+if [[ $breaches -gt 0 ]]; then echo "$breaches breaches"; exit 1; fi
+echo "pure"
