@@ -51,6 +51,7 @@ endfunction()
 
 # roadfix_process(NAME SOURCES handler.cpp ... DEPS ...) makes the library roadfix_process_NAME (the handler, linked by replay and tests)
 # and the program bin/NAME from main.cpp.
+add_custom_target(roadfix_programs)
 function(roadfix_process NAME)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;SYSTEM_DEPS" ${ARGN})
   list(TRANSFORM ARG_DEPS PREPEND roadfix_)
@@ -60,6 +61,7 @@ function(roadfix_process NAME)
   target_precompile_headers(roadfix_process_${NAME} REUSE_FROM roadfix_pch)
   add_executable(${NAME} main.cpp)
   target_link_libraries(${NAME} PRIVATE roadfix_process_${NAME} roadfix_options)
+  add_dependencies(roadfix_programs ${NAME})
 endfunction()
 
 # roadfix_test(NAME LABELS unit SOURCES a_test.cpp ... DEPS ...) makes bin/NAME_test; each Catch2 test case is one CTest.
