@@ -43,6 +43,7 @@ struct ScoreFacts {
 struct Outage {
   int64_t first_withheld_us = 0;  ///< utime of the first fix withheld
   int64_t last_withheld_us = 0;   ///< utime of the last one: the error of the outage is the error here
+  int64_t return_us = 0;          ///< utime of the first fix given again; last_withheld_us where none follows
 };
 
 struct DriveFacts {
@@ -83,6 +84,7 @@ template <class Visitor>
 void visit(Outage& f, Visitor& v) {
   v.integer("first_withheld_us", f.first_withheld_us, INT64_MIN, INT64_MAX);
   v.integer("last_withheld_us", f.last_withheld_us, INT64_MIN, INT64_MAX);
+  v.integer("return_us", f.return_us, INT64_MIN, INT64_MAX);
 }
 
 /// Beyond the contract's visitor: choices(key, std::vector<Enum>&, names) and groups(key, std::vector<T>&), a sequence

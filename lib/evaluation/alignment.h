@@ -1,0 +1,35 @@
+/// Alignments of an estimate to a reference. Each hides another kind of error, so a figure is never shown without the
+/// name of its alignment.
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+#include <vector>
+
+#include "evaluation/trajectory.h"
+
+namespace roadfix {
+
+enum class Alignment {
+  kNone,  ///< as published: absolute error
+  kYaw,   ///< yaw and translation: what gravity cannot fix
+  kSe3,   ///< rotation and translation
+  kSim3,  ///< rotation, translation and scale: monocular vision
+};
+
+const char* name_of(Alignment alignment);
+
+/// x -> scale * T x.
+struct Similarity {
+  double scale = 1.0;
+  SE3 T;  ///< rotation, then translation in the reference's frame, after scaling
+};
+
+/// The similarity of the given kind that brings the estimates' positions closest to the references' in the
+/// least-squares sense (Umeyama, PAMI 13, 1991; yaw alone: the same problem restricted to turns about z). Nothing where
+/// the positions do not determine it (fewer than three, or all on a line for SE3 and Sim3, all in a point for yaw).
+std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment);
+
+Odometry transformed(const Similarity& S, const Odometry& pose);
+
+}  // namespace roadfix

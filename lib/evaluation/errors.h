@@ -1,0 +1,45 @@
+/// Errors of single poses and their figures per axis of the vehicle.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "evaluation/trajectory.h"
+#include "statistics/summary.h"
+
+namespace roadfix {
+
+/// Estimate minus reference at one time.
+struct PoseError {
+  int64_t t_us = 0;
+  Eigen::Vector3d position_frame = Eigen::Vector3d::Zero();    ///< m, axes of the common frame (east, north, up)
+  Eigen::Vector3d position_vehicle = Eigen::Vector3d::Zero();  ///< m: longitudinal, lateral (left), vertical (up)
+  Eigen::Vector3d angles = Eigen::Vector3d::Zero();            ///< rad: roll, pitch, yaw, each wrapped
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();          ///< rad, log(q_reference^-1 q_estimate), vehicle axes
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s, vehicle axes (frame axes without attitude)
+  Validity validity = Validity::kInvalid;
+
+  [[nodiscard]] double norm() const { return position_frame.norm(); }
+  [[nodiscard]] double horizontal() const { return position_frame.head<2>().norm(); }
+};
+
+/// What the reference can tell about.
+struct ReferenceKind {
+  bool attitude = true;
+  bool velocity = true;
+};
+
+/// The vehicle's axes are the reference's where it has attitude and the estimate's otherwise.
+PoseError pose_error(const PosePair& pair, const ReferenceKind& kind);
+std::vector<PoseError> pose_errors(const std::vector<PosePair>& pairs, const ReferenceKind& kind);
+
+struct AxisErrors {
+  Summary horizontal, norm;                 ///< m
+  Summary longitudinal, lateral, vertical;  ///< m
+  std::optional<Summary> roll, pitch, yaw;  ///< rad
+  std::optional<Summary> speed;             ///< m/s, norm of the velocity error
+};
+
+AxisErrors axis_errors(const std::vector<PoseError>& errors, const ReferenceKind& kind);
+
+}  // namespace roadfix
