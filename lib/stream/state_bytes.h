@@ -1,0 +1,94 @@
+/// Serialised states: values in the order they were put, in the machine's own bytes (x86-64 and ARM64 agree).
+/// Reading past the end or leaving bytes over throws: a snapshot is taken whole or not at all.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace roadfix {
+
+class StateWriter {
+ public:
+  template <class T>
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void put(T value) { put_raw(&value, sizeof value); }
+  void put(const std::string& text) {
+    put(static_cast<int64_t>(text.size()));
+    put_raw(text.data(), text.size());
+  }
+  void put(std::span<const uint8_t> bytes) {
+    put(static_cast<int64_t>(bytes.size()));
+    put_raw(bytes.data(), bytes.size());
+  }
+  /// Of a size that the reader knows.
+  template <class Derived>
+  void put(const Eigen::PlainObjectBase<Derived>& matrix) {
+    put_raw(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(typename Derived::Scalar));
+  }
+
+  [[nodiscard]] std::vector<uint8_t> take() { return std::move(bytes_); }
+
+ private:
+  void put_raw(const void* data, std::size_t size) {
+    const auto* begin = static_cast<const uint8_t*>(data);
+    bytes_.insert(bytes_.end(), begin, begin + size);
+  }
+
+  std::vector<uint8_t> bytes_;
+};
+
+class StateReader {
+ public:
+  explicit StateReader(std::span<const uint8_t> bytes) : rest_(bytes) {}
+
+  template <class T>
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void get(T& value) { get_raw(&value, sizeof value); }
+  void get(std::string& text) {
+    const std::span<const uint8_t> bytes = get_block();
+    text.assign(bytes.begin(), bytes.end());
+  }
+  void get(std::vector<uint8_t>& block) {
+    const std::span<const uint8_t> bytes = get_block();
+    block.assign(bytes.begin(), bytes.end());
+  }
+  template <class Derived>
+  void get(Eigen::PlainObjectBase<Derived>& matrix) {
+    get_raw(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(typename Derived::Scalar));
+  }
+  template <class T>
+  [[nodiscard]] T get() {
+    T value{};
+    get(value);
+    return value;
+  }
+
+  /// Throws unless everything was read.
+  void finish() const {
+    if (!rest_.empty()) throw std::runtime_error("state: " + std::to_string(rest_.size()) + " bytes left over");
+  }
+
+ private:
+  void get_raw(void* data, std::size_t size) {
+    if (size > rest_.size()) throw std::runtime_error("state: ends too early");
+    if (size > 0) std::memcpy(data, rest_.data(), size);
+    rest_ = rest_.subspan(size);
+  }
+  std::span<const uint8_t> get_block() {
+    const auto size = get<int64_t>();
+    if (size < 0 || static_cast<uint64_t>(size) > rest_.size()) throw std::runtime_error("state: ends too early");
+    const std::span<const uint8_t> block = rest_.first(static_cast<std::size_t>(size));
+    rest_ = rest_.subspan(static_cast<std::size_t>(size));
+    return block;
+  }
+
+  std::span<const uint8_t> rest_;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,177 @@
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+#include <lcm/lcm-cpp.hpp>
+#include <random>
+
+#include "bus/log_reader.h"
+#include "bus/log_writer.h"
+#include "support/temporary_folder.h"
+
+using namespace roadfix;
+
+namespace {
+
+constexpr int kEvents = 300;
+
+/// Different for each i, also in length; contains no log magic.
+std::vector<uint8_t> payload(int i) {
+  std::vector<uint8_t> bytes(static_cast<std::size_t>(10 + i % 37));
+  for (std::size_t k = 0; k < bytes.size(); ++k)
+    bytes[k] = static_cast<uint8_t>((k * 7 + static_cast<std::size_t>(i)) % 200);
+  return bytes;
+}
+
+void write_log(const std::filesystem::path& path) {
+  LogWriter writer(path);
+  for (int i = 0; i < kEvents; ++i) writer.write(i % 3 == 0 ? "GNSS" : "IMU", 1'000'000 + i, payload(i));
+  writer.commit();
+}
+
+std::string read_bytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+/// The numbers of the events that come back with exactly their own contents.
+std::vector<int> intact_events(LogReader& reader) {
+  std::vector<int> numbers;
+  while (const auto event = reader.next()) {
+    const auto i = static_cast<int>(event->eventnum);
+    const std::vector<uint8_t> expected = payload(i);
+    REQUIRE(std::equal(event->data.begin(), event->data.end(), expected.begin(), expected.end()));
+    numbers.push_back(i);
+  }
+  return numbers;
+}
+
+}  // namespace
+
+TEST_CASE("a written log comes back, also through LCM's own reader") {
+  test::TemporaryFolder folder;
+  write_log(folder / "a.lcm");
+  LogReader reader(folder / "a.lcm");
+  REQUIRE(intact_events(reader).size() == kEvents);
+  REQUIRE(reader.damage().empty());
+
+  lcm::LogFile theirs((folder / "a.lcm").string(), "r");
+  for (int i = 0; i < kEvents; ++i) {
+    const lcm::LogEvent* event = theirs.readNextEvent();
+    REQUIRE(event != nullptr);
+    REQUIRE(event->timestamp == 1'000'000 + i);
+    REQUIRE(event->channel == (i % 3 == 0 ? "GNSS" : "IMU"));
+    REQUIRE(event->datalen == static_cast<int>(payload(i).size()));
+  }
+  REQUIRE(theirs.readNextEvent() == nullptr);
+}
+
+TEST_CASE("a log that LCM wrote is read to the same events") {
+  test::TemporaryFolder folder;
+  {
+    lcm::LogFile theirs((folder / "a.lcm").string(), "w");
+    for (int i = 0; i < kEvents; ++i) {
+      std::vector<uint8_t> bytes = payload(i);
+      lcm::LogEvent event{};
+      event.timestamp = i;
+      event.channel = "IMU";
+      event.datalen = static_cast<int>(bytes.size());
+      event.data = bytes.data();
+      REQUIRE(theirs.writeEvent(&event) == 0);
+    }
+  }
+  LogReader reader(folder / "a.lcm");
+  REQUIRE(intact_events(reader).size() == kEvents);
+  REQUIRE(reader.damage().empty());
+}
+
+TEST_CASE("a log that is not committed leaves nothing under its name") {
+  test::TemporaryFolder folder;
+  {
+    LogWriter writer(folder / "a.lcm");
+    writer.write("IMU", 1, payload(1));
+    writer.flush(true);
+    REQUIRE_FALSE(std::filesystem::exists(folder / "a.lcm"));
+    REQUIRE_THROWS_AS(LogWriter(folder / "a.lcm"), LogError);  // two writers of one log
+  }
+  REQUIRE(std::filesystem::is_empty(folder / ""));
+}
+
+TEST_CASE("a full disk is an error and leaves nothing plausible") {
+  if (!std::filesystem::exists("/dev/full")) return;
+  LogWriter writer("/dev/full", LogWriter::Mode::kRecording);
+  writer.write("IMU", 1, payload(1));
+  REQUIRE_THROWS_WITH(writer.flush(false), Catch::Contains("No space left"));
+}
+
+TEST_CASE("truncated at any byte: all whole events come back and the rest is reported") {
+  test::TemporaryFolder folder;
+  write_log(folder / "a.lcm");
+  const std::string whole = read_bytes(folder / "a.lcm");
+  std::vector<std::size_t> ends{0};
+  {
+    LogReader reader(folder / "a.lcm");
+    while (const auto event = reader.next()) ends.push_back(event->offset + log_event_bytes(*event));
+  }
+  for (std::size_t size = whole.size() - 400; size <= whole.size(); ++size) {
+    write_bytes(folder / "b.lcm", whole.substr(0, size));
+    LogReader reader(folder / "b.lcm");
+    const auto expected = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), size) - ends.begin()) - 1;
+    REQUIRE(intact_events(reader).size() == expected);
+    REQUIRE(reader.damage().size() == (ends[expected] == size ? 0U : 1U));
+  }
+}
+
+TEST_CASE("a hundred broken heads cost exactly their own events") {
+  test::TemporaryFolder folder;
+  write_log(folder / "a.lcm");
+  std::string bytes = read_bytes(folder / "a.lcm");
+  std::vector<std::size_t> offsets;
+  {
+    LogReader reader(folder / "a.lcm");
+    while (const auto event = reader.next()) offsets.push_back(event->offset);
+  }
+  std::vector<int> numbers(kEvents);
+  for (int i = 0; i < kEvents; ++i) numbers[static_cast<std::size_t>(i)] = i;
+  std::mt19937 random(7);
+  std::shuffle(numbers.begin(), numbers.end(), random);
+  for (int k = 0; k < 100; ++k) {
+    for (std::size_t byte = 0; byte < 4; ++byte)
+      bytes[offsets[static_cast<std::size_t>(numbers[static_cast<std::size_t>(k)])] + byte] = 'x';
+  }
+  write_bytes(folder / "b.lcm", bytes);
+  LogReader reader(folder / "b.lcm");
+  std::vector<int> expected(numbers.begin() + 100, numbers.end());
+  std::sort(expected.begin(), expected.end());
+  REQUIRE(intact_events(reader) == expected);
+  uint64_t damaged = 0;
+  for (const LogDamage& damage : reader.damage()) damaged += damage.bytes;
+  uint64_t lost = 0;
+  for (int k = 0; k < 100; ++k) {
+    const int i = numbers[static_cast<std::size_t>(k)];
+    lost += kLogHeadBytes + (i % 3 == 0 ? 4U : 3U) + payload(i).size();
+  }
+  REQUIRE(damaged == lost);
+}
+
+TEST_CASE("a wrong length does not swallow the events behind it") {
+  test::TemporaryFolder folder;
+  write_log(folder / "a.lcm");
+  std::string bytes = read_bytes(folder / "a.lcm");
+  LogReader whole(folder / "a.lcm");
+  uint64_t offset = 0;
+  for (int i = 0; i <= 50; ++i) offset = whole.next()->offset;
+  for (const char length : {'\x00', '\x01', '\x7f'}) {
+    bytes[offset + 25] = length;  // 0, 65536 or 8 million bytes more than there are
+    bytes[offset + 27] = '\x70';
+    write_bytes(folder / "b.lcm", bytes);
+    LogReader reader(folder / "b.lcm");
+    const std::vector<int> numbers = intact_events(reader);
+    REQUIRE(numbers.size() == kEvents - 1);
+    REQUIRE(reader.damage().size() == 1);
+    REQUIRE(reader.damage()[0].offset == offset);
+  }
+}
