@@ -1,0 +1,140 @@
+#include "features/stereo_matcher.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/so3.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int kSearchLevel = 1;  ///< of the pyramid: half the size
+constexpr int kSearchHalf = 4;   ///< patches of 9 x 9 pixels at that level
+constexpr int kPatch = (2 * kSearchHalf + 1) * (2 * kSearchHalf + 1);
+constexpr int kRefineLevels = 1;
+constexpr int kRefineWindow = 15;
+
+struct Patch {
+  std::array<int, kPatch> value{};
+  int64_t sum = 0, sum_of_squares = 0;
+};
+
+/// Pixels around (u, v); nothing at the border. Integers: correlation is exact up to one division.
+std::optional<Patch> patch_at(const cv::Mat& gray, int u, int v) {
+  if (u < kSearchHalf || v < kSearchHalf || u >= gray.cols - kSearchHalf || v >= gray.rows - kSearchHalf) {
+    return std::nullopt;
+  }
+  Patch patch;
+  size_t i = 0;
+  for (int r = v - kSearchHalf; r <= v + kSearchHalf; ++r) {
+    const uint8_t* line = gray.ptr<uint8_t>(r);
+    for (int c = u - kSearchHalf; c <= u + kSearchHalf; ++c) {
+      const int value = line[c];
+      patch.value[i++] = value;
+      patch.sum += value;
+      patch.sum_of_squares += value * value;
+    }
+  }
+  return patch;
+}
+
+double correlation(const Patch& a, const Patch& b) {
+  int32_t product = 0;  // at most 81 * 255^2
+  for (size_t i = 0; i < kPatch; ++i) product += a.value[i] * b.value[i];
+  const auto centred = [](int64_t xy, int64_t x, int64_t y) { return static_cast<double>(kPatch * xy - x * y); };
+  const double variance = centred(a.sum_of_squares, a.sum, a.sum) * centred(b.sum_of_squares, b.sum, b.sum);
+  return variance > 0.0 ? centred(product, a.sum, b.sum) / std::sqrt(variance) : 0.0;
+}
+
+}  // namespace
+
+StereoMatcher::StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left,
+                             const StereoConfig& config)
+    : left_(left),
+      right_(right),
+      T_right_left_(T_right_left),
+      E_(skew(T_right_left.p) * T_right_left.R()),
+      config_(config) {}
+
+std::optional<Eigen::Vector2f> StereoMatcher::right_pixel(const Eigen::Vector2d& normalised,
+                                                          double inverse_depth) const {
+  // The point in right axes times its inverse depth: finite for a point at infinity too.
+  const Eigen::Vector3d p = T_right_left_.q * normalised.homogeneous() + inverse_depth * T_right_left_.p;
+  const auto pixel = right_.project(p);
+  if (!pixel) return std::nullopt;
+  return Eigen::Vector2f(pixel->cast<float>());
+}
+
+std::optional<Eigen::Vector2f> StereoMatcher::search(const cv::Mat& left, const cv::Mat& right,
+                                                     const Eigen::Vector2f& pixel,
+                                                     const Eigen::Vector2d& normalised) const {
+  constexpr float kShrink = 1.0F / static_cast<float>(1 << kSearchLevel);
+  const auto round_to_level = [&](const Eigen::Vector2f& p) {
+    return Eigen::Vector2i(static_cast<int>(std::lround(p.x() * kShrink)),
+                           static_cast<int>(std::lround(p.y() * kShrink)));
+  };
+  const Eigen::Vector2i centre = round_to_level(pixel);
+  const auto wanted = patch_at(left, centre.x(), centre.y());
+  if (!wanted) return std::nullopt;
+
+  // Inverse depth in steps of about one pixel of the search level.
+  const double nearest = 1.0 / config_.min_depth_m;
+  const double pixels = right_.focal() * T_right_left_.p.norm() * nearest * kShrink;
+  const int steps = std::clamp(static_cast<int>(std::ceil(pixels)), 1, 400);
+  double best = config_.min_correlation;
+  std::optional<Eigen::Vector2f> best_pixel;
+  Eigen::Vector2i last(-1, -1);
+  for (int i = 0; i <= steps; ++i) {
+    const auto candidate = right_pixel(normalised, nearest * i / steps);
+    if (!candidate) continue;
+    const Eigen::Vector2i at = round_to_level(*candidate);
+    if (at == last) continue;
+    last = at;
+    const auto patch = patch_at(right, at.x(), at.y());
+    if (!patch) continue;
+    const double score = correlation(*wanted, *patch);
+    if (score > best) {
+      best = score;
+      best_pixel = candidate;
+    }
+  }
+  return best_pixel;
+}
+
+double StereoMatcher::epipolar_error_px(const Eigen::Vector2d& left, const Eigen::Vector2d& right) const {
+  const Eigen::Vector3d line = E_ * left.homogeneous();
+  const double norm = line.head<2>().norm();
+  return norm > 0.0 ? std::abs(right.homogeneous().dot(line)) / norm * right_.focal() : 0.0;
+}
+
+std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& left, const cv::Mat& right,
+                                                                 std::span<const StereoQuery> queries) const {
+  std::vector<std::optional<Eigen::Vector2f>> result(queries.size());
+  const FlowConfig flow{kRefineWindow, kRefineLevels, config_.max_round_trip_px};
+  const std::vector<cv::Mat> left_pyramid = flow_pyramid(left, flow), right_pyramid = flow_pyramid(right, flow);
+  if (left_pyramid.size() <= kSearchLevel || right_pyramid.size() <= kSearchLevel) return result;
+
+  std::vector<size_t> index;
+  std::vector<Eigen::Vector2f> from, to;
+  for (size_t i = 0; i < queries.size(); ++i) {
+    const auto normalised = left_.unproject(queries[i].pixel.cast<double>());
+    if (!normalised) continue;
+    const auto start = queries[i].depth ? right_pixel(*normalised, 1.0 / *queries[i].depth)
+                                        : search(left_pyramid[kSearchLevel], right_pyramid[kSearchLevel],
+                                                 queries[i].pixel, *normalised);
+    if (!start) continue;
+    index.push_back(i);
+    from.push_back(queries[i].pixel);
+    to.push_back(*start);
+  }
+  const std::vector<bool> found = follow(left_pyramid, right_pyramid, from, to, flow);
+  for (size_t k = 0; k < index.size(); ++k) {
+    if (!found[k]) continue;
+    const auto l = left_.unproject(from[k].cast<double>());
+    const auto r = right_.unproject(to[k].cast<double>());
+    if (l && r && epipolar_error_px(*l, *r) <= config_.max_epipolar_px) result[index[k]] = to[k];
+  }
+  return result;
+}
+
+}  // namespace roadfix

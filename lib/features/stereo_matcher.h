@@ -1,0 +1,59 @@
+/// Finds points of the left picture in the right one: a coarse search along the epipolar curve, then Lucas-Kanade, then
+/// a test of the distance from the curve. Works for any two overlapping cameras; nothing is rectified.
+#pragma once
+
+#include <Eigen/Dense>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "camera/camera.h"
+#include "features/flow.h"
+#include "geometry/se3.h"
+
+namespace roadfix {
+
+struct StereoConfig {
+  double min_depth_m = 2.0;        ///< nearest point that is looked for
+  double max_epipolar_px = 1.0;    ///< distance from the epipolar line
+  double min_correlation = 0.8;    ///< of the coarse patches, normalised
+  double max_round_trip_px = 0.7;  ///< left to right and back
+};
+
+template <class Visitor>
+void visit(StereoConfig& c, Visitor& v) {
+  v.number("min_depth_m", c.min_depth_m, 0.1, 100.0);
+  v.number("max_epipolar_px", c.max_epipolar_px, 0.1, 10.0);
+  v.number("min_correlation", c.min_correlation, 0.0, 1.0);
+  v.number("max_round_trip_px", c.max_round_trip_px, 0.05, 10.0);
+}
+
+struct StereoQuery {
+  Eigen::Vector2f pixel;        ///< in the left picture
+  std::optional<double> depth;  ///< m along the left camera's z, where it is known already
+};
+
+class StereoMatcher {
+ public:
+  StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left, const StereoConfig& config);
+
+  /// The right pixel of each query, or nothing.
+  [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat& left, const cv::Mat& right,
+                                                                  std::span<const StereoQuery> queries) const;
+
+ private:
+  [[nodiscard]] std::optional<Eigen::Vector2f> right_pixel(const Eigen::Vector2d& normalised,
+                                                           double inverse_depth) const;
+  [[nodiscard]] std::optional<Eigen::Vector2f> search(const cv::Mat& left, const cv::Mat& right,
+                                                      const Eigen::Vector2f& pixel,
+                                                      const Eigen::Vector2d& normalised) const;
+  [[nodiscard]] double epipolar_error_px(const Eigen::Vector2d& left, const Eigen::Vector2d& right) const;
+
+  Camera left_, right_;
+  SE3 T_right_left_;
+  Eigen::Matrix3d E_;  ///< essential matrix: right' E left = 0
+  StereoConfig config_;
+};
+
+}  // namespace roadfix
