@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "geometry/determinism.h"
+#include "roadfix/commands.h"
 
 namespace {
 
@@ -16,10 +17,13 @@ int main(int argc, char** argv) {
   roadfix::fix_eigen_blocking();
   CLI::App app{"Roadfix: localization for road vehicles, replayable to the bit", "roadfix"};
   app.require_subcommand(1);
+  roadfix::add_doctor_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : kUserError;
+    // CLI11's own codes are above 100; a subcommand that has said what failed ends with its small one.
+    const int code = app.exit(e);
+    return code > 100 ? kUserError : code;
   } catch (const std::exception& e) {
     std::cerr << "roadfix: " << e.what() << "\n";
     return kUserError;

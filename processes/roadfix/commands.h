@@ -1,0 +1,12 @@
+/// The subcommands of the tool: each adds itself to the application.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace roadfix {
+
+void add_doctor_command(CLI::App& app);
+
+}  // namespace roadfix

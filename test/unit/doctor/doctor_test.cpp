@@ -1,0 +1,107 @@
+#include "roadfix/doctor/doctor.h"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <sstream>
+
+namespace roadfix {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A made /proc, removed at the end.
+class MadeRoot {
+ public:
+  MadeRoot() : root_(fs::temp_directory_path() / ("roadfix_doctor_" + std::to_string(::getpid()))) {
+    fs::create_directories(root_);
+  }
+  ~MadeRoot() { fs::remove_all(root_); }
+  MadeRoot(const MadeRoot&) = delete;
+  MadeRoot& operator=(const MadeRoot&) = delete;
+  void write(const std::string& file, const std::string& text) const {
+    fs::create_directories((root_ / file).parent_path());
+    std::ofstream(root_ / file) << text;
+  }
+  [[nodiscard]] const fs::path& path() const { return root_; }
+
+ private:
+  fs::path root_;
+};
+
+const std::string kHeading = "Iface\tDestination\tGateway\tFlags\tRefCnt\tUse\tMetric\tMask\tMTU\tWindow\tIRTT\n";
+const std::string kDefaultRoute = "eth0\t00000000\t0101A8C0\t0003\t0\t0\t0\t00000000\t0\t0\t0\n";
+const std::string kMulticastLo = "lo\t000000E0\t00000000\t0001\t0\t0\t0\t000000F0\t0\t0\t0\n";
+
+TEST_CASE("a bus URL is taken apart and a wrong one names its part") {
+  CHECK(parse_bus_url("udpm://").ttl == 0);
+  const BusUrl url = parse_bus_url("udpm://239.1.2.3:7700?recv_buf_size=2097152&ttl=1");
+  CHECK(url.group == "239.1.2.3");
+  CHECK(url.port == 7700);
+  CHECK(url.ttl == 1);
+  CHECK_THROWS_WITH(parse_bus_url("udpm://10.0.0.1:7667"), Catch::Contains("no multicast address"));
+  CHECK_THROWS_WITH(parse_bus_url("udpm://239.1.2.3:x"), Catch::Contains("port"));
+  CHECK_THROWS_WITH(parse_bus_url("tcpq://"), Catch::Contains("udpm"));
+}
+
+TEST_CASE("the route is the most exact one, and what is wrong has a mend") {
+  const MadeRoot root;
+  const BusUrl local;
+  BusUrl network;
+  network.ttl = 1;
+  root.write("proc/net/route", kHeading);
+  CHECK(check_route(root.path(), local).level == Level::kError);
+  CHECK(check_route(root.path(), local).mend.find("dev lo") != std::string::npos);
+  root.write("proc/net/route", kHeading + kDefaultRoute);
+  CHECK(check_route(root.path(), local).level == Level::kWarning);
+  CHECK(check_route(root.path(), network).level == Level::kOk);
+  root.write("proc/net/route", kHeading + kDefaultRoute + kMulticastLo);
+  CHECK(check_route(root.path(), local).level == Level::kOk);
+  CHECK(check_route(root.path(), network).level == Level::kError);
+}
+
+TEST_CASE("small buffers are found and named by their sysctl") {
+  const MadeRoot root;
+  root.write("proc/sys/net/core/rmem_max", "4194304\n");
+  root.write("proc/sys/net/core/rmem_default", "212992\n");
+  const std::vector<Finding> findings = check_buffers(root.path());
+  REQUIRE(findings.size() == 2);
+  CHECK(findings[0].level == Level::kOk);
+  CHECK(findings[1].level == Level::kWarning);
+  CHECK(findings[1].mend == "sysctl -w net.core.rmem_default=4194304");
+}
+
+TEST_CASE("reassembly matters only between hosts") {
+  const MadeRoot root;
+  root.write("proc/sys/net/ipv4/ipfrag_high_thresh", "4194304\n");
+  root.write("proc/sys/net/ipv4/ipfrag_time", "30\n");
+  BusUrl url;
+  CHECK(check_reassembly(root.path(), url).empty());
+  url.ttl = 1;
+  CHECK(check_reassembly(root.path(), url).size() == 2);
+}
+
+TEST_CASE("missing Java and types are said with the package that brings them") {
+  const MadeRoot root;
+  root.write("usr/bin/java", "");
+  const std::vector<Finding> findings = check_spy("/bin:/usr/bin", root.path(), root.path() / "types.jar");
+  REQUIRE(findings.size() == 3);
+  CHECK(findings[0].level == Level::kOk);
+  CHECK(findings[1].mend.find("liblcm-java") != std::string::npos);
+  CHECK(findings[2].level == Level::kWarning);
+}
+
+TEST_CASE("the disk check compares with what a drive wants") {
+  CHECK(check_disk("/", 1).level == Level::kOk);
+  CHECK(check_disk("/", UINT64_MAX).level == Level::kWarning);
+  CHECK(check_disk("/no/such/folder", 1).level == Level::kError);
+}
+
+TEST_CASE("the worst finding comes last and is returned") {
+  std::ostringstream out;
+  CHECK(print_findings({{Level::kError, "b", "bad", "mend it"}, {Level::kOk, "a", "fine", ""}}, out) == Level::kError);
+  CHECK(out.str().find("fine") < out.str().find("bad"));
+  CHECK(out.str().find("mend: mend it") != std::string::npos);
+}
+
+}  // namespace
+}  // namespace roadfix
