@@ -1,0 +1,185 @@
+#include "evaluation/evaluate.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace roadfix {
+namespace {
+
+constexpr double kLargestDelay_s = 2.0;
+constexpr double kDelayStep_s = 0.05;
+constexpr double kDelayPrecision_s = 1e-4;
+
+/// Whether the reference may be scored at a time: both its neighbours may.
+class ScoreMask {
+ public:
+  ScoreMask(const Reference& reference, const DriveFacts& facts)
+      : reference_(reference), facts_(facts), time_(scored_time(reference, facts)) {}
+
+  [[nodiscard]] bool operator()(int64_t t_us) const {
+    if (t_us < time_.first || t_us > time_.second) return false;
+    const auto& poses = reference_.trajectory.poses;
+    const auto after = std::lower_bound(poses.begin(), poses.end(), t_us,
+                                        [](const Odometry& pose, int64_t t) { return pose.t_us < t; });
+    const auto index = static_cast<std::size_t>(after - poses.begin());
+    if (index >= poses.size()) return false;
+    if (poses[index].t_us == t_us) return scorable(index);
+    return index > 0 && scorable(index) && scorable(index - 1);
+  }
+
+ private:
+  [[nodiscard]] bool scorable(std::size_t i) const {
+    const ReferenceFlags& flags = reference_.flags[i];
+    return flags.may_score && (flags.withheld || !facts_.score_withheld_only);
+  }
+
+  const Reference& reference_;
+  const DriveFacts& facts_;
+  std::pair<int64_t, int64_t> time_;
+};
+
+std::vector<PosePair> scored_pairs(const Reference& reference, const DriveFacts& facts, const Trajectory& estimate,
+                                   double delay_s) {
+  const auto delay_us = static_cast<int64_t>(std::llround(delay_s * 1e6));
+  auto pairs = associate(estimate, reference.trajectory, facts.reference.from_fixes, delay_us);
+  const ScoreMask mask(reference, facts);
+  std::erase_if(pairs, [&](const PosePair& pair) { return !mask(pair.reference.t_us); });
+  return pairs;
+}
+
+void apply(const Similarity& S, std::vector<PosePair>& pairs) {
+  for (PosePair& pair : pairs) pair.estimate = transformed(S, pair.estimate);
+}
+
+AlignedAte aligned_ate(std::vector<PosePair> pairs, Alignment alignment, const Similarity& S) {
+  apply(S, pairs);
+  const auto errors = pose_errors(pairs, {.attitude = false, .velocity = false});
+  AlignedAte out{alignment, ate_rmse(errors), ate_mean(errors), 0.0, S.scale};
+  std::vector<double> horizontal;
+  for (const PoseError& e : errors) horizontal.push_back(e.horizontal());
+  out.horizontal_rmse = root_mean_square(horizontal);
+  return out;
+}
+
+/// The delay with the smallest ATE after alignment: coarse steps, then golden sections.
+double fitted_delay(const Reference& reference, const DriveFacts& facts, const Trajectory& estimate,
+                    Alignment alignment) {
+  const auto cost = [&](double delay_s) {
+    const auto pairs = scored_pairs(reference, facts, estimate, delay_s);
+    const auto S = align(pairs, alignment);
+    return S ? aligned_ate(pairs, alignment, *S).rmse : INFINITY;
+  };
+  double best_s = 0.0;
+  double best = cost(0.0);
+  for (double delay_s = -kLargestDelay_s; delay_s <= kLargestDelay_s; delay_s += kDelayStep_s) {
+    const double value = cost(delay_s);
+    if (value < best) {
+      best = value;
+      best_s = delay_s;
+    }
+  }
+  const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
+  double low = best_s - kDelayStep_s;
+  double high = best_s + kDelayStep_s;
+  while (high - low > kDelayPrecision_s) {
+    const double a = high - golden * (high - low);
+    const double b = low + golden * (high - low);
+    if (cost(a) < cost(b)) {
+      high = b;
+    } else {
+      low = a;
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+Alignment default_alignment(const EstimateInput& estimate) {
+  if (estimate.scale_unknown) return Alignment::kSim3;
+  return estimate.local_frame ? Alignment::kYaw : Alignment::kNone;
+}
+
+void take_to_reference_point(EstimateInput& estimate, const DriveFacts& facts, const EvaluationOptions& options) {
+  if (facts.reference.of != ReferenceOf::kAntenna || !estimate.trajectory.has_attitude) return;
+  for (Odometry& pose : estimate.trajectory.poses) pose = at_lever_arm(pose, options.p_vehicle_antenna);
+}
+
+void measure_pairs(ChannelReport& report, const ReferenceKind& kind, const EvaluationOptions& options) {
+  const auto& pairs = report.scored;
+  report.pairs = static_cast<int>(pairs.size());
+  report.errors = pose_errors(pairs, kind);
+  report.axes = axis_errors(report.errors, kind);
+  report.ate_rmse = ate_rmse(report.errors);
+  report.ate_mean = ate_mean(report.errors);
+  if (pairs.empty()) return;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    intervals.push_back(seconds_between(pairs[i - 1].reference.t_us, pairs[i].reference.t_us));
+  }
+  report.interval_s = median(intervals);
+  report.duration_s = seconds_between(pairs.front().reference.t_us, pairs.back().reference.t_us);
+  report.distance_m = path_lengths(pairs).back();
+  report.rpe_mean = rpe_mean(pairs, options.rpe_stride);
+  if (!kind.attitude) return;
+  report.kitti = kitti_drift(pairs);
+  if (report.interval_s > 0.0) {
+    report.rpe_rmse = rpe_rmse(pairs, std::max(1, static_cast<int>(std::lround(1.0 / report.interval_s))));
+  }
+}
+
+void measure_outages(ChannelReport& report, const Reference& reference, const DriveFacts& facts,
+                     const Trajectory& estimate, const ReferenceKind& kind) {
+  Trajectory aligned = estimate;
+  const auto delay_us = static_cast<int64_t>(std::llround(report.delay_s * 1e6));
+  for (Odometry& pose : aligned.poses) {
+    pose = transformed(report.similarity, pose);
+    pose.t_us += delay_us;
+  }
+  report.outages = outage_errors(aligned, reference.trajectory, facts.outages, kind);
+  report.tse_m = transition_stability(report.errors, facts.outages);
+  report.rct = reconvergence(report.errors, facts.outages);
+}
+
+}  // namespace
+
+std::pair<int64_t, int64_t> scored_time(const Reference& reference, const DriveFacts& facts) {
+  const auto& poses = reference.trajectory.poses;
+  const auto skip_us = static_cast<int64_t>(std::llround(facts.score.skip_s * 1e6));
+  return {facts.first_fix_us + skip_us, poses.empty() ? facts.first_fix_us + skip_us : poses.back().t_us};
+}
+
+ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& facts, EstimateInput estimate,
+                               const EvaluationOptions& options) {
+  const ReferenceKind kind{.attitude = facts.reference.attitude && estimate.trajectory.has_attitude,
+                           .velocity = facts.reference.velocity && estimate.trajectory.has_velocity};
+  ChannelReport report;
+  report.channel = estimate.channel;
+  report.poses = static_cast<int>(estimate.trajectory.poses.size());
+  report.alignment = options.alignment.value_or(default_alignment(estimate));
+  const auto [begin_us, end_us] = scored_time(reference, facts);
+  report.availability = availability(estimate.trajectory, begin_us, end_us);
+  if (!estimate.latencies.empty()) report.latency = summarise(estimate.latencies);
+  std::erase_if(estimate.modes, [&](const ModeSample& m) { return m.t_us < begin_us || m.t_us > end_us; });
+  report.modes = mode_accuracy(estimate.modes, reference.trajectory, options.turn_threshold);
+
+  take_to_reference_point(estimate, facts, options);
+  if (options.fit_delay) report.delay_s = fitted_delay(reference, facts, estimate.trajectory, report.alignment);
+  report.scored = scored_pairs(reference, facts, estimate.trajectory, report.delay_s);
+  for (const Alignment alignment : {Alignment::kNone, Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}) {
+    const auto S = align(report.scored, alignment);
+    if (S && !report.scored.empty()) report.ate_by_alignment.push_back(aligned_ate(report.scored, alignment, *S));
+  }
+  const auto S = align(report.scored, report.alignment);
+  if (!S) {
+    report.scored.clear();  // an alignment that the data does not determine: nothing is scored, and pairs says so
+  } else {
+    report.similarity = *S;
+    apply(*S, report.scored);
+  }
+  measure_pairs(report, kind, options);
+  report.honesty = honesty(report.scored, kind, facts.reference.sigma_m);
+  report.sigmas = sigma_samples(report.scored, kind, facts.reference.sigma_m);
+  measure_outages(report, reference, facts, estimate.trajectory, kind);
+  return report;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,92 @@
+/// The whole evaluation of one drive: a reference, what may be scored of it, and one report per estimate.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluation/alignment.h"
+#include "evaluation/availability.h"
+#include "evaluation/drift.h"
+#include "evaluation/drive_facts.h"
+#include "evaluation/errors.h"
+#include "evaluation/honesty.h"
+#include "evaluation/modes.h"
+#include "evaluation/outages.h"
+
+namespace roadfix {
+
+struct ReferenceFlags {
+  bool may_score = true;
+  bool withheld = false;  ///< from a fix that the estimators did not get
+};
+
+struct Reference {
+  Trajectory trajectory;
+  std::vector<ReferenceFlags> flags;  ///< one per pose
+};
+
+/// One estimate, in the reference's frame or in its own.
+struct EstimateInput {
+  std::string channel;
+  Trajectory trajectory;
+  bool local_frame = false;       ///< its own frame: absolute errors mean nothing without an alignment
+  bool scale_unknown = false;     ///< lengths up to one factor
+  std::vector<double> latencies;  ///< s, from the time of validity to the time it was logged
+  std::vector<ModeSample> modes;  ///< of the fusion, else empty
+};
+
+struct EvaluationOptions {
+  std::optional<Alignment> alignment;  ///< none: by the estimate's frame (ENU: none; own: yaw; no scale: sim3)
+  bool fit_delay = false;              ///< the reference's constant latency is fitted first, within +-2 s
+  Eigen::Vector3d p_vehicle_antenna = Eigen::Vector3d::Zero();   ///< for references of the antenna
+  double turn_threshold = 3.0 * 3.14159265358979323846 / 180.0;  ///< rad/s, of MPA
+  int rpe_stride = 100;                                          ///< samples, paper C
+};
+
+struct AlignedAte {
+  Alignment alignment = Alignment::kNone;
+  double rmse = 0.0;             ///< m, as evo
+  double mean = 0.0;             ///< m, as paper C
+  double horizontal_rmse = 0.0;  ///< m
+  double scale = 1.0;
+};
+
+struct ChannelReport {
+  std::string channel;
+  Alignment alignment = Alignment::kNone;
+  Similarity similarity;
+  double delay_s = 0.0;     ///< fitted: the reference lags the estimate by this
+  int poses = 0;            ///< published
+  int pairs = 0;            ///< scored
+  double interval_s = 0.0;  ///< median time between scored pairs
+  double duration_s = 0.0;
+  double distance_m = 0.0;
+
+  AxisErrors axes;
+  double ate_rmse = 0.0;
+  double ate_mean = 0.0;
+  std::vector<AlignedAte> ate_by_alignment;
+  std::optional<double> rpe_mean;         ///< m, paper C
+  std::optional<RelativeError> rpe_rmse;  ///< evo, over the samples of about one second
+  std::optional<KittiDrift> kitti;
+  OutageErrors outages;
+  std::optional<double> tse_m;
+  std::optional<Reconvergence> rct;
+  std::optional<ModeAccuracy> modes;
+  Honesty honesty;
+  Availability availability;
+  std::optional<Summary> latency;  ///< s
+
+  std::vector<PosePair> scored;  ///< after alignment
+  std::vector<PoseError> errors;
+  std::vector<SigmaSample> sigmas;
+};
+
+/// The time that counts: from skip_s after the first fix to the end of the reference.
+std::pair<int64_t, int64_t> scored_time(const Reference& reference, const DriveFacts& facts);
+
+ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& facts, EstimateInput estimate,
+                               const EvaluationOptions& options);
+
+}  // namespace roadfix

@@ -1,0 +1,162 @@
+#include "evaluation/evaluate.h"
+
+#include <catch2/catch.hpp>
+
+#include "geometry/frames.h"
+#include "unit/evaluation/synthetic.h"
+
+namespace roadfix {
+namespace {
+
+using test::changed;
+using test::eight_trajectory;
+constexpr int64_t kSecond = 1'000'000;
+
+Reference exact_reference(double dt_s = 0.1) {
+  Reference reference{eight_trajectory(0.0, 200.0, dt_s), {}};
+  reference.flags.resize(reference.trajectory.poses.size());
+  return reference;
+}
+
+DriveFacts exact_facts() {
+  DriveFacts facts;
+  facts.reference = {ReferenceOf::kImu, true, true, false, 0.0};
+  return facts;
+}
+
+EstimateInput estimate_of(Trajectory trajectory) {
+  EstimateInput input;
+  input.channel = "POSE_TEST";
+  input.trajectory = std::move(trajectory);
+  return input;
+}
+
+TEST_CASE("a perfect estimate scores zero everywhere and is there all the time") {
+  const ChannelReport report =
+      evaluate_channel(exact_reference(), exact_facts(), estimate_of(eight_trajectory(0.0, 200.0, 0.01)), {});
+  CHECK(report.pairs == 2001);
+  CHECK(report.ate_rmse < 1e-9);
+  CHECK(report.availability.valid == Approx(1.0));
+  CHECK(report.interval_s == Approx(0.1));
+  CHECK(report.rpe_rmse->delta == 10);
+  CHECK(report.alignment == Alignment::kNone);
+  CHECK(report.kitti->translation_percent < 1e-9);
+}
+
+TEST_CASE("nothing before skip_s is scored") {
+  DriveFacts facts = exact_facts();
+  facts.first_fix_us = 5 * kSecond;
+  facts.score.skip_s = 40.0;
+  const Trajectory late = changed(eight_trajectory(0.0, 200.0, 0.01), [](Odometry& pose) {
+    if (pose.t_us < 45 * kSecond) pose.T_frame_vehicle.p.x() += 100.0;
+  });
+  const ChannelReport report = evaluate_channel(exact_reference(), facts, estimate_of(late), {});
+  CHECK(report.axes.norm.max < 1e-9);
+  CHECK(report.scored.front().reference.t_us == 45 * kSecond);
+  facts.score.skip_s = 39.0;
+  CHECK(evaluate_channel(exact_reference(), facts, estimate_of(late), {}).axes.norm.max > 99.0);
+}
+
+TEST_CASE("references of a fix type that does not count are not scored") {
+  Reference reference = exact_reference();
+  for (std::size_t i = 500; i < 600; ++i) {
+    reference.flags[i].may_score = false;
+    reference.trajectory.poses[i].T_frame_vehicle.p.y() += 5.0;
+  }
+  DriveFacts facts = exact_facts();
+  facts.reference.from_fixes = true;
+  const ChannelReport report = evaluate_channel(reference, facts, estimate_of(eight_trajectory(0.0, 200.0, 0.01)), {});
+  CHECK(report.pairs == 1901);
+  CHECK(report.axes.norm.max < 1e-9);
+}
+
+TEST_CASE("where fixes were thinned out the withheld ones alone are scored") {
+  Reference reference = exact_reference(0.25);
+  for (std::size_t i = 0; i < reference.flags.size(); ++i) reference.flags[i].withheld = i % 4 != 0;
+  // An estimate that repeats the fixes it was given and is 1 m off elsewhere.
+  const Trajectory cheat = changed(eight_trajectory(0.0, 200.0, 0.25), [](Odometry& pose) {
+    if (pose.t_us % kSecond != 0) pose.T_frame_vehicle.p.z() += 1.0;
+  });
+  DriveFacts facts = exact_facts();
+  facts.reference.from_fixes = true;
+  CHECK(evaluate_channel(reference, facts, estimate_of(cheat), {}).axes.norm.rms < 0.9);
+  facts.score_withheld_only = true;
+  const ChannelReport report = evaluate_channel(reference, facts, estimate_of(cheat), {});
+  CHECK(report.axes.norm.rms == Approx(1.0));
+  CHECK(report.pairs == 600);
+}
+
+TEST_CASE("the antenna's reference is compared with the antenna") {
+  const Eigen::Vector3d lever_arm(1.2, 0.3, 1.5);
+  Reference reference = exact_reference();
+  reference.trajectory = changed(reference.trajectory, [&](Odometry& pose) {
+    pose.T_frame_vehicle.p = pose.T_frame_vehicle * lever_arm;
+    pose.T_frame_vehicle.q.setIdentity();
+  });
+  reference.trajectory.has_attitude = reference.trajectory.has_velocity = false;
+  DriveFacts facts = exact_facts();
+  facts.reference = {ReferenceOf::kAntenna, false, false, true, 0.0};
+  const auto estimate = estimate_of(eight_trajectory(0.0, 200.0, 0.1));
+  EvaluationOptions options;
+  CHECK(evaluate_channel(reference, facts, estimate, options).axes.norm.rms == Approx(lever_arm.norm()));
+  options.p_vehicle_antenna = lever_arm;
+  CHECK(evaluate_channel(reference, facts, estimate, options).axes.norm.max < 1e-9);
+}
+
+TEST_CASE("an estimate in its own frame is aligned by yaw and one without scale by Sim3") {
+  const SE3 T{exp_q({0, 0, 2.0}), {50.0, 60.0, -7.0}};
+  auto estimate = estimate_of(changed(eight_trajectory(0.0, 200.0, 0.05), [&](Odometry& pose) {
+    pose.T_frame_vehicle = T * pose.T_frame_vehicle;
+    pose.T_frame_vehicle.p *= 0.2;
+  }));
+  for (Odometry& pose : estimate.trajectory.poses) pose.velocity *= 0.2;
+  estimate.local_frame = true;
+  CHECK(evaluate_channel(exact_reference(), exact_facts(), estimate, {}).ate_rmse > 10.0);
+  estimate.scale_unknown = true;
+  const ChannelReport report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
+  CHECK(report.alignment == Alignment::kSim3);
+  CHECK(report.similarity.scale == Approx(5.0));
+  CHECK(report.ate_rmse < 1e-8);
+  REQUIRE(report.ate_by_alignment.size() == 4);
+  CHECK(report.ate_by_alignment[0].rmse > 10.0);
+}
+
+TEST_CASE("a constant latency of the reference is found where it is asked for") {
+  Reference reference = exact_reference(1.0);
+  for (Odometry& pose : reference.trajectory.poses) pose.t_us += 430'000;
+  DriveFacts facts = exact_facts();
+  facts.reference.from_fixes = true;
+  const auto estimate = estimate_of(eight_trajectory(0.0, 200.0, 0.01));
+  EvaluationOptions options;
+  CHECK(evaluate_channel(reference, facts, estimate, options).ate_rmse > 1.0);
+  options.fit_delay = true;
+  const ChannelReport report = evaluate_channel(reference, facts, estimate, options);
+  CHECK(report.delay_s == Approx(0.43).margin(2e-4));
+  CHECK(report.ate_rmse < 5e-3);
+}
+
+TEST_CASE("availability tells valid, coasting, invalid and silent") {
+  Trajectory trajectory = eight_trajectory(0.0, 100.0, 0.1);
+  for (Odometry& pose : trajectory.poses) {
+    if (pose.t_us >= 20 * kSecond && pose.t_us < 30 * kSecond) pose.validity = Validity::kCoasting;
+    if (pose.t_us >= 30 * kSecond && pose.t_us < 35 * kSecond) pose.validity = Validity::kInvalid;
+  }
+  std::erase_if(trajectory.poses,
+                [](const Odometry& pose) { return pose.t_us >= 60 * kSecond && pose.t_us < 70 * kSecond; });
+  const Availability a = availability(trajectory, 0, 100 * kSecond);
+  CHECK(a.coasting == Approx(0.10));
+  CHECK(a.invalid == Approx(0.05));
+  CHECK(a.silent == Approx(0.10 - 0.002).margin(1e-9));
+  CHECK(a.valid + a.coasting + a.invalid + a.silent == Approx(1.0));
+  REQUIRE(a.spans.size() == 6);
+  CHECK(a.spans.back().end_us == 100 * kSecond);
+}
+
+TEST_CASE("without an estimate everything is silent and nothing is scored") {
+  const ChannelReport report = evaluate_channel(exact_reference(), exact_facts(), estimate_of({}), {});
+  CHECK(report.pairs == 0);
+  CHECK(report.availability.silent == Approx(1.0));
+}
+
+}  // namespace
+}  // namespace roadfix
