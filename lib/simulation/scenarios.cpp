@@ -82,4 +82,14 @@ ScenarioConfig scenario(std::string_view name) {
   return c;
 }
 
+ImuConfig perfect_imu(double rate_hz) {
+  ImuConfig c;
+  c.rate_hz = rate_hz;
+  c.gyro_noise_radps_per_rthz = c.accel_noise_mps2_per_rthz = 0.0;
+  c.gyro_bias_std_radps = c.accel_bias_std_mps2 = 0.0;
+  c.gyro_bias_drift_std_radps = c.accel_bias_drift_std_mps2 = 0.0;
+  c.gyro_scale_std = c.accel_scale_std = 0.0;
+  return c;
+}
+
 }  // namespace roadfix

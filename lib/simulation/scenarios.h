@@ -19,6 +19,9 @@ std::string scenario_summary(std::string_view name);
 /// The configuration of a named scenario; std::invalid_argument, naming all, where there is none.
 ScenarioConfig scenario(std::string_view name);
 
+/// An imu without any error.
+ImuConfig perfect_imu(double rate_hz);
+
 /// Way points of a route, enough of them for duration_s.
 std::vector<WayPoint> way_points(RouteKind route, double duration_s);
 
