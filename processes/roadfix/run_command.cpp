@@ -1,0 +1,55 @@
+// roadfix run: the vehicle's processes, kept alive.
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <thread>
+
+#include "config/config.h"
+#include "roadfix/commands.h"
+#include "roadfix/supervise/supervisor.h"
+
+namespace roadfix {
+namespace {
+
+volatile std::sig_atomic_t stop_asked = 0;
+
+struct Options {
+  std::filesystem::path vehicle;
+  std::string bus;
+  bool print_config = false;
+};
+
+void run(const Options& options) {
+  RunConfig config = load_config<RunConfig>(options.vehicle / "run.yaml");
+  if (!options.bus.empty()) config.bus = options.bus;
+  if (options.print_config) {
+    std::cout << config_text(config);
+    return;
+  }
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stop_asked = 1; });
+  const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  Supervisor supervisor(config, std::filesystem::absolute(options.vehicle), programs,
+                        [](const std::string& line) { std::cout << line << std::endl; });
+  while (stop_asked == 0) {
+    supervisor.step();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  supervisor.stop();
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("run", "Start a vehicle's processes, restart what dies, stop all in order on Ctrl-C");
+  command->add_option("vehicle", options->vehicle, "folder with run.yaml, for example configs/demo")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--bus", options->bus, "LCM URL instead of run.yaml's");
+  command->add_flag("--print-config", options->print_config, "print the effective configuration and end");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace roadfix
