@@ -1,0 +1,163 @@
+#include "recorder/recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "recorder/sidecar.h"
+
+namespace roadfix {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kMicrosecond = 1e-6;
+
+}  // namespace
+
+uint64_t free_space(const fs::path& folder) {
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  return error ? 0 : space.available;
+}
+
+Recording::Recording(const RecorderConfig& config, const std::string& name, FreeSpace free)
+    : config_(config), folder_(config.folder), name_(name), free_(std::move(free)) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error) throw LogError(folder_.string() + ": cannot make the folder for recordings: " + error.message());
+  open_next();
+  check_space();
+}
+
+Recording::~Recording() { close(); }
+
+void Recording::open_next() {
+  const fs::path path = folder_ / fmt::format("{}.{:03}.lcm", name_, files_.size());
+  log_ = std::make_unique<LogWriter>(path, LogWriter::Mode::kRecording);
+  files_.push_back(path);
+  facts_.emplace_back().name = path.filename().string();
+  write_sidecar();
+}
+
+void Recording::finish_file() {
+  if (!log_) return;
+  facts_.back().bytes = log_->bytes();
+  const std::unique_ptr<LogWriter> closing = std::move(log_);
+  closing->commit();
+}
+
+void Recording::split() {
+  if (state_ == State::kStopped || log_->events() == 0) return;
+  try {
+    finish_file();
+    open_next();
+  } catch (const LogError& e) {
+    stop(e.what());
+  }
+}
+
+void Recording::stop(const std::string& reason) {
+  if (state_ == State::kStopped) return;
+  state_ = State::kStopped;
+  reason_ = reason;
+  try {
+    finish_file();
+  } catch (const LogError&) {
+    // The disk takes no more: what it has is intact up to the last whole event, and the reason is kept.
+  }
+  write_sidecar();
+}
+
+void Recording::write(const std::string& channel, int64_t received_us, std::span<const uint8_t> data) {
+  if (state_ == State::kStopped) {
+    ++unwritten_;
+    return;
+  }
+  FileFacts& facts = facts_.back();
+  const bool too_long =
+      facts.first_us != 0 && static_cast<double>(received_us - facts.first_us) * kMicrosecond >= config_.split_time;
+  if (too_long || static_cast<double>(log_->bytes() + data.size()) > config_.split_size * kMebi) split();
+  if (state_ == State::kStopped) {
+    ++unwritten_;
+    return;
+  }
+  try {
+    log_->write(channel, received_us, data);
+  } catch (const LogError& e) {
+    ++unwritten_;
+    stop(e.what());
+    return;
+  }
+  FileFacts& current = facts_.back();
+  if (current.first_us == 0) current.first_us = received_us;
+  current.last_us = std::max(current.last_us, received_us);
+  ++current.events[channel];
+}
+
+void Recording::flush(int64_t now_us) {
+  if (state_ == State::kStopped || static_cast<double>(now_us - flushed_us_) * kMicrosecond < config_.flush_interval)
+    return;
+  flushed_us_ = now_us;
+  try {
+    log_->flush(true);
+  } catch (const LogError& e) {
+    stop(e.what());
+    return;
+  }
+  check_space();
+}
+
+uint64_t Recording::recorded_bytes() const {
+  uint64_t total = 0;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
+    if (entry.path().extension() == ".lcm") total += entry.file_size(error);
+  return total;
+}
+
+bool Recording::delete_oldest() {
+  std::vector<fs::path> logs;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
+    if (entry.path().extension() == ".lcm" && entry.path() != files_.back()) logs.push_back(entry.path());
+  // Names begin with the UTC time of their start: the alphabet is the calendar.
+  const auto oldest = std::min_element(logs.begin(), logs.end());
+  return oldest != logs.end() && fs::remove(*oldest, error);
+}
+
+void Recording::check_space() {
+  const auto full = [&]() -> std::string {
+    const double left = static_cast<double>(free_(folder_)) / kGibi;
+    if (left < config_.min_free)
+      return fmt::format("{:.2f} GiB left on the disk of {}, min_free_gib is {}", left, folder_.string(),
+                         config_.min_free);
+    if (config_.quota <= 0.0) return "";
+    const double used = static_cast<double>(recorded_bytes()) / kGibi;
+    return used > config_.quota
+               ? fmt::format("{:.2f} GiB recorded in {}, quota_gib is {}", used, folder_.string(), config_.quota)
+               : "";
+  };
+  std::string why = full();
+  while (!why.empty() && config_.when_full == WhenFull::kDeleteOldest && delete_oldest()) why = full();
+  if (!why.empty()) stop(why);
+}
+
+void Recording::write_sidecar() const {
+  Sidecar sidecar;
+  sidecar.stopped_because = reason_;
+  sidecar.dropped = dropped_;
+  sidecar.unwritten = unwritten_;
+  for (const FileFacts& f : facts_) sidecar.files.push_back({f.name, f.first_us, f.last_us, f.bytes, f.events});
+  roadfix::write_sidecar(folder_ / (name_ + ".json"), sidecar);
+}
+
+void Recording::close() {
+  if (state_ == State::kRecording)
+    stop("");
+  else
+    write_sidecar();
+}
+
+}  // namespace roadfix

@@ -1,0 +1,85 @@
+/// One recording: a series of LCM logs NAME.000.lcm, NAME.001.lcm ... split by size and time, and a sidecar NAME.json
+/// with the type definitions, their fingerprints, versions, and what each file holds. Plain LCM tools read the logs.
+///
+/// The receive times come with the messages; the disk's state is asked for at each split and each flush.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bus/log_writer.h"
+#include "recorder/recorder_config.h"
+
+namespace roadfix {
+
+/// Free bytes of the disk that holds a folder; a test hands in its own.
+using FreeSpace = std::function<uint64_t(const std::filesystem::path&)>;
+uint64_t free_space(const std::filesystem::path& folder);
+
+class Recording {
+ public:
+  enum class State { kRecording, kStopped };
+
+  /// Makes the folder; throws LogError where that or the first file fails. `name` is usually the start's UTC time.
+  Recording(const RecorderConfig& config, const std::string& name, FreeSpace free = free_space);
+  ~Recording();
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+
+  /// Appends to the current file or, once stopped, only counts. A failing disk stops the recording; it never throws.
+  void write(const std::string& channel, int64_t received_us, std::span<const uint8_t> data);
+
+  /// What was written is on the disk; splits and stops as the configuration says.
+  void flush(int64_t now_us);
+
+  /// Closes the current file and begins the next; no message is lost.
+  void split();
+
+  /// Tells the sidecar what never reached the disk, per channel.
+  void note_dropped(const std::map<std::string, int64_t>& dropped) { dropped_ = dropped; }
+
+  /// Everything on disk, sidecar last.
+  void close();
+
+  [[nodiscard]] State state() const { return state_; }
+  [[nodiscard]] const std::string& reason() const { return reason_; }  ///< why it stopped
+  [[nodiscard]] int64_t unwritten() const { return unwritten_; }       ///< messages that came after the stop
+  [[nodiscard]] const std::vector<std::filesystem::path>& files() const { return files_; }
+
+ private:
+  struct FileFacts {
+    std::string name;
+    int64_t first_us = 0;
+    int64_t last_us = 0;
+    std::map<std::string, int64_t> events;
+    uint64_t bytes = 0;
+  };
+
+  void open_next();
+  void finish_file();
+  void stop(const std::string& reason);
+  void check_space();
+  bool delete_oldest();
+  [[nodiscard]] uint64_t recorded_bytes() const;
+  void write_sidecar() const;
+
+  RecorderConfig config_;
+  std::filesystem::path folder_;
+  std::string name_;
+  FreeSpace free_;
+  std::unique_ptr<LogWriter> log_;
+  std::vector<std::filesystem::path> files_;
+  std::vector<FileFacts> facts_;
+  std::map<std::string, int64_t> dropped_;
+  State state_ = State::kRecording;
+  std::string reason_;
+  int64_t unwritten_ = 0;
+  int64_t flushed_us_ = 0;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,133 @@
+#include "recorder/recording.h"
+
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bus/log_reader.h"
+
+namespace roadfix {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("roadfix_recorder_" + std::to_string(::getpid()))) {
+    fs::remove_all(path_);
+  }
+  ~Folder() { fs::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] RecorderConfig config() const {
+    RecorderConfig config;
+    config.folder = path_.string();
+    config.min_free = 0.0;
+    config.flush_interval = 0.0;
+    return config;
+  }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+const std::vector<uint8_t> kData(100'000, 42);
+
+int64_t events_in(const std::vector<fs::path>& files) {
+  int64_t events = 0;
+  for (const fs::path& file : files) {
+    LogReader reader(file);
+    while (reader.next()) ++events;
+    CHECK(reader.damage().empty());
+  }
+  return events;
+}
+
+nlohmann::json sidecar(const fs::path& path) { return nlohmann::json::parse(std::ifstream(path)); }
+
+TEST_CASE("a recording splits by size and by time and loses nothing") {
+  const Folder folder;
+  RecorderConfig config = folder.config();
+  config.split_size = 1.0;
+  config.split_time = 5.0;
+  Recording recording(config, "20260101T000000Z");
+  for (int i = 0; i < 30; ++i)
+    recording.write("CAMERA_LEFT", 1'000'000 + i * 10'000, kData);  // 3 MB within a third of a second
+  for (int i = 0; i < 12; ++i) recording.write("GNSS", 2'000'000 + i * 1'000'000, {kData.data(), 10});
+  recording.close();
+  CHECK(recording.files().size() >= 5);
+  CHECK(events_in(recording.files()) == 42);
+  const nlohmann::json facts = sidecar(folder.path() / "20260101T000000Z.json");
+  CHECK(facts["files"].size() == recording.files().size());
+  CHECK(facts["files"][0]["events"]["CAMERA_LEFT"] == 10);
+  CHECK(facts["types"].size() >= 20);
+  CHECK(facts["types"][0]["fingerprint"].get<std::string>().size() == 16);
+  CHECK(facts["stopped_because"] == "");
+}
+
+TEST_CASE("recording stops before the disk is full and says why") {
+  const Folder folder;
+  RecorderConfig config = folder.config();
+  config.min_free = 1.0;
+  uint64_t free = uint64_t{2} << 30;
+  Recording recording(config, "a", [&](const fs::path&) { return free; });
+  recording.write("GNSS", 1, {kData.data(), 10});
+  recording.flush(1);
+  CHECK(recording.state() == Recording::State::kRecording);
+  free = uint64_t{1} << 29;
+  recording.flush(2);
+  CHECK(recording.state() == Recording::State::kStopped);
+  CHECK(recording.reason().find("min_free_gib") != std::string::npos);
+  recording.write("GNSS", 3, {kData.data(), 10});
+  CHECK(recording.unwritten() == 1);
+  recording.close();
+  CHECK(events_in(recording.files()) == 1);
+  CHECK(sidecar(folder.path() / "a.json")["unwritten"] == 1);
+}
+
+TEST_CASE("over its quota a recording stops, or deletes the oldest files") {
+  const bool ring = GENERATE(false, true);
+  const Folder folder;
+  RecorderConfig config = folder.config();
+  config.split_size = 1.0;
+  config.quota = 3.5 / 1024.0;
+  config.when_full = ring ? WhenFull::kDeleteOldest : WhenFull::kStop;
+  Recording recording(config, "a");
+  for (int i = 0; i < 60; ++i) {
+    recording.write("CAMERA_LEFT", 1 + i, kData);
+    recording.flush(1 + i);
+  }
+  CHECK((recording.state() == Recording::State::kRecording) == ring);
+  uint64_t bytes = 0;
+  for (const auto& entry : fs::directory_iterator(folder.path()))
+    if (entry.path().extension() == ".lcm") bytes += entry.file_size();
+  CHECK(static_cast<double>(bytes) < 4.0 * kMebi);
+  CHECK(fs::exists(recording.files().back()));
+  CHECK(fs::exists(recording.files().front()) != ring);
+}
+
+TEST_CASE("a disk that takes no more ends the recording with a reason, not the program") {
+  const Folder folder;
+  Recording recording(folder.config(), "a");
+  fs::remove_all(folder.path());
+  // The next file cannot be made: its folder is gone.
+  recording.write("GNSS", 1, {kData.data(), 10});
+  recording.split();
+  CHECK(recording.state() == Recording::State::kStopped);
+  CHECK_FALSE(recording.reason().empty());
+}
+
+TEST_CASE("what was flushed survives the end of the program") {
+  const Folder folder;
+  Recording recording(folder.config(), "a");
+  recording.write("GNSS", 1, {kData.data(), 10});
+  recording.flush(1);
+  LogReader reader(recording.files().front());  // while it is still being written, as after SIGKILL
+  CHECK(reader.next()->channel == "GNSS");
+}
+
+}  // namespace
+}  // namespace roadfix
