@@ -1,8 +1,10 @@
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "geodesy/gravity.h"
 #include "geometry/so3.h"
+#include "simulation/link.h"
 #include "simulation/sensors.h"
 
 namespace roadfix {
@@ -48,6 +50,33 @@ struct ImuErrorSource {
   Eigen::Vector3d accel_turn_on;
 };
 
+/// What faults add to a sample and do with its noise.
+struct ImuDisturbance {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  double noise_factor = 1.0;
+  double gyro_limit = std::numeric_limits<double>::infinity();
+  double accel_limit = std::numeric_limits<double>::infinity();
+};
+
+ImuDisturbance disturbance_at(FaultSet& faults, double t_s) {
+  ImuDisturbance d;
+  faults.for_each(t_s, [&](ActiveFault& f) {
+    if (f->kind == FaultKind::kNoise) d.noise_factor *= f->get("factor");
+    if (f->kind == FaultKind::kImuBias) {
+      d.gyro += Eigen::Vector3d(f->get("gyro_x_radps"), f->get("gyro_y_radps"), f->get("gyro_z_radps"));
+      d.accel += Eigen::Vector3d(f->get("accel_x_mps2"), f->get("accel_y_mps2"), f->get("accel_z_mps2"));
+    }
+    if (f->kind == FaultKind::kSaturation) {
+      d.gyro_limit = f->get("gyro_radps");
+      d.accel_limit = f->get("accel_mps2");
+    }
+  });
+  return d;
+}
+
+Eigen::Vector3d clipped(const Eigen::Vector3d& x, double limit) { return x.cwiseMin(limit).cwiseMax(-limit); }
+
 }  // namespace
 
 InertialState inertial_state(const Kinematics& k, const ImuMount& mount, const Eigen::Vector3d& gravity_enu,
@@ -67,12 +96,12 @@ void simulate_imu(SimulatedDrive& drive) {
   const ImuConfig& c = drive.config.imu;
   SimulationErrors& errors = drive.errors;
   ImuErrorSource source(drive);
+  FaultSet faults(drive, Sensor::kImu);
   errors.gyro_scale = c.gyro_scale_std * stream_of(drive, NoiseStream::kGyroScale).normal3();
   errors.accel_scale = c.accel_scale_std * stream_of(drive, NoiseStream::kAccelScale).normal3();
   errors.q_vehicle_imu = exp_q(c.mounting_std_rad.cwiseProduct(stream_of(drive, NoiseStream::kMounting).normal3()));
   const ImuMount mount{errors.q_vehicle_imu, c.position_m};
   const std::vector<std::int64_t> times = sample_times(c.rate_hz, 0.0, drive.config.duration_s);
-  const auto offset_us = static_cast<std::int64_t>(std::llround(c.clock_offset_s * 1e6));
   drive.imu.reserve(times.size());
   errors.imu_bias.reserve(times.size());
   for (std::size_t i = 1; i < times.size(); ++i) {
@@ -80,17 +109,22 @@ void simulate_imu(SimulatedDrive& drive) {
     const InertialState mean = mean_over(*drive.motion, seconds_between(0, times[i - 1]), dt_s, mount, drive.anchor);
     source.gyro_drift.advance(dt_s);
     source.accel_drift.advance(dt_s);
-    const ImuBias bias{source.gyro_turn_on + source.gyro_drift.value(),
-                       source.accel_turn_on + source.accel_drift.value()};
+    const ImuDisturbance fault = disturbance_at(faults, seconds_between(0, times[i]));
+    const ImuBias bias{source.gyro_turn_on + source.gyro_drift.value() + fault.gyro,
+                       source.accel_turn_on + source.accel_drift.value() + fault.accel};
+    const double noise = fault.noise_factor / std::sqrt(dt_s);
+    const Eigen::Vector3d gyro = mean.angular_rate + errors.gyro_scale.cwiseProduct(mean.angular_rate) + bias.gyro +
+                                 noise * c.gyro_noise_radps_per_rthz * source.gyro_noise.normal3();
+    const Eigen::Vector3d accel = mean.specific_force + errors.accel_scale.cwiseProduct(mean.specific_force) +
+                                  bias.accel + noise * c.accel_noise_mps2_per_rthz * source.accel_noise.normal3();
     ImuSample sample;
-    sample.t_us = drive.config.start_utime + times[i] + offset_us;
-    sample.gyro = mean.angular_rate + errors.gyro_scale.cwiseProduct(mean.angular_rate) + bias.gyro +
-                  c.gyro_noise_radps_per_rthz / std::sqrt(dt_s) * source.gyro_noise.normal3();
-    sample.accel = mean.specific_force + errors.accel_scale.cwiseProduct(mean.specific_force) + bias.accel +
-                   c.accel_noise_mps2_per_rthz / std::sqrt(dt_s) * source.accel_noise.normal3();
+    sample.t_us = drive.config.start_utime + times[i];
+    sample.gyro = clipped(gyro, fault.gyro_limit);
+    sample.accel = clipped(accel, fault.accel_limit);
     drive.imu.push_back(sample);
     errors.imu_bias.push_back(bias);
   }
+  deliver(drive, Sensor::kImu, c.link, drive.imu, &errors.imu_bias, drive.deliveries.imu);
 }
 
 }  // namespace roadfix

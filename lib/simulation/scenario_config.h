@@ -6,6 +6,10 @@
 #include <Eigen/Dense>
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include "samples/samples.h"
+#include "simulation/faults.h"
 
 namespace roadfix {
 
@@ -31,6 +35,17 @@ struct MotionConfig {
   double pitch_rad_per_mps2 = 0.002;  ///< dive and squat by longitudinal acceleration
 };
 
+/// From the sensor to the log: stamps and transport. A message is stamped true time + offset + drift + jitter and
+/// arrives at true time + delay + up to delay_jitter.
+struct LinkConfig {
+  double clock_offset_s = 0.0;
+  double clock_drift_ppm = 0.0;  ///< of the clock that stamps, from the start of the drive
+  double stamp_jitter_s = 0.0;   ///< standard deviation
+  double delay_s = 0.0;
+  double delay_jitter_s = 0.0;  ///< uniform in [0, this]
+  double drop_probability = 0.0;
+};
+
 struct ImuConfig {
   double rate_hz = 100.0;
   double gyro_noise_radps_per_rthz = 1.0e-4;
@@ -44,13 +59,14 @@ struct ImuConfig {
   double accel_scale_std = 1.0e-3;
   Eigen::Vector3d mounting_std_rad = Eigen::Vector3d::Constant(0.0);  ///< roll, pitch, yaw about the nominal mounting
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();               ///< of the imu in the vehicle
-  double clock_offset_s = 0.0;                                        ///< stamp minus true time
+  LinkConfig link = {.delay_s = 0.002, .delay_jitter_s = 0.001};
 };
 
 struct GnssConfig {
   double rate_hz = 5.0;
-  double phase_s = 0.0;              ///< of the first fix
-  double sigma_horizontal_m = 0.02;  ///< white noise, each of east and north
+  double phase_s = 0.0;                   ///< of the first fix
+  FixType fix_type = FixType::kRtkFixed;  ///< as the receiver names its fixes; single under multipath
+  double sigma_horizontal_m = 0.02;       ///< white noise, each of east and north
   double sigma_up_m = 0.04;
   double multipath_sigma_m = 0.0;  ///< correlated error, Gauss-Markov, each axis (up: twice)
   double multipath_correlation_s = 30.0;
@@ -60,6 +76,7 @@ struct GnssConfig {
   double lever_arm_std_m = 0.0;                    ///< true lever arm about it, each axis
   double position_latency_s = 0.0;                 ///< the position stamped t is of t minus this
   double velocity_latency_s = 0.0;
+  LinkConfig link = {.delay_s = 0.08, .delay_jitter_s = 0.04};
 };
 
 enum class WheelLayout { kNone, kOneSpeed, kFourSpeeds };
@@ -78,7 +95,7 @@ struct WheelsConfig {
   double yaw_rate_bias_std_radps = 0.003;
   double track_width_m = 1.55;
   double wheelbase_m = 2.7;
-  double clock_offset_s = 0.0;  ///< stamp minus true time
+  LinkConfig link = {.delay_s = 0.01, .delay_jitter_s = 0.005};
 };
 
 struct MagConfig {
@@ -90,6 +107,7 @@ struct MagConfig {
   Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();  ///< as the calibration says
   double hard_iron_std_ut = 0.5;                           ///< true one about it, each axis
   double soft_iron_std = 0.005;                            ///< each element about the identity
+  LinkConfig link = {.delay_s = 0.01, .delay_jitter_s = 0.005};
 };
 
 struct ScenarioConfig {
@@ -105,6 +123,7 @@ struct ScenarioConfig {
   GnssConfig gnss;
   WheelsConfig wheels;
   MagConfig mag;
+  std::vector<Fault> faults;
 };
 
 template <class Visitor>
@@ -128,6 +147,16 @@ void visit(MotionConfig& c, Visitor& v) {
 }
 
 template <class Visitor>
+void visit(LinkConfig& c, Visitor& v) {
+  v.number("clock_offset_s", c.clock_offset_s, -10.0, 10.0);
+  v.number("clock_drift_ppm", c.clock_drift_ppm, -1e4, 1e4);
+  v.number("stamp_jitter_s", c.stamp_jitter_s, 0.0, 1.0);
+  v.number("delay_s", c.delay_s, 0.0, 10.0);
+  v.number("delay_jitter_s", c.delay_jitter_s, 0.0, 10.0);
+  v.number("drop_probability", c.drop_probability, 0.0, 1.0);
+}
+
+template <class Visitor>
 void visit(ImuConfig& c, Visitor& v) {
   v.number("rate_hz", c.rate_hz, 1.0, 2000.0);
   v.number("gyro_noise_radps_per_rthz", c.gyro_noise_radps_per_rthz, 0.0, 1.0);
@@ -141,13 +170,18 @@ void visit(ImuConfig& c, Visitor& v) {
   v.number("accel_scale_std", c.accel_scale_std, 0.0, 0.2);
   v.vector("mounting_std_rad", c.mounting_std_rad, 0.0, 1.0);
   v.vector("position_m", c.position_m, -20.0, 20.0);
-  v.number("clock_offset_s", c.clock_offset_s, -10.0, 10.0);
+  v.group("link", c.link);
 }
 
 template <class Visitor>
 void visit(GnssConfig& c, Visitor& v) {
   v.number("rate_hz", c.rate_hz, 0.0, 100.0);
   v.number("phase_s", c.phase_s, 0.0, 60.0);
+  v.choice("fix_type", c.fix_type,
+           {{"single", FixType::kSingle},
+            {"differential", FixType::kDifferential},
+            {"rtk_float", FixType::kRtkFloat},
+            {"rtk_fixed", FixType::kRtkFixed}});
   v.number("sigma_horizontal_m", c.sigma_horizontal_m, 0.0, 1000.0);
   v.number("sigma_up_m", c.sigma_up_m, 0.0, 1000.0);
   v.number("multipath_sigma_m", c.multipath_sigma_m, 0.0, 1000.0);
@@ -158,6 +192,7 @@ void visit(GnssConfig& c, Visitor& v) {
   v.number("lever_arm_std_m", c.lever_arm_std_m, 0.0, 5.0);
   v.number("position_latency_s", c.position_latency_s, -2.0, 2.0);
   v.number("velocity_latency_s", c.velocity_latency_s, -2.0, 2.0);
+  v.group("link", c.link);
 }
 
 template <class Visitor>
@@ -177,7 +212,7 @@ void visit(WheelsConfig& c, Visitor& v) {
   v.number("yaw_rate_bias_std_radps", c.yaw_rate_bias_std_radps, 0.0, 1.0);
   v.number("track_width_m", c.track_width_m, 0.1, 5.0);
   v.number("wheelbase_m", c.wheelbase_m, 0.1, 20.0);
-  v.number("clock_offset_s", c.clock_offset_s, -10.0, 10.0);
+  v.group("link", c.link);
 }
 
 template <class Visitor>
@@ -190,6 +225,7 @@ void visit(MagConfig& c, Visitor& v) {
   v.vector("hard_iron_ut", c.hard_iron_ut, -500.0, 500.0);
   v.number("hard_iron_std_ut", c.hard_iron_std_ut, 0.0, 100.0);
   v.number("soft_iron_std", c.soft_iron_std, 0.0, 0.5);
+  v.group("link", c.link);
 }
 
 template <class Visitor>
@@ -206,6 +242,7 @@ void visit(ScenarioConfig& c, Visitor& v) {
   v.group("gnss", c.gnss);
   v.group("wheels", c.wheels);
   v.group("mag", c.mag);
+  v.groups("faults", c.faults);
 }
 
 }  // namespace roadfix

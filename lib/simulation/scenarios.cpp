@@ -13,6 +13,58 @@ struct Scenario {
   std::function<void(ScenarioConfig&)> set;
 };
 
+/// A receiver without correction service, in a car.
+void use_street_receiver(GnssConfig& c) {
+  c.fix_type = FixType::kDifferential;
+  c.sigma_horizontal_m = 0.3;
+  c.sigma_up_m = 0.6;
+  c.sigma_velocity_mps = 0.05;
+}
+
+void add_faults(ScenarioConfig& c, std::initializer_list<const char*> texts) {
+  for (const char* text : texts) c.faults.push_back(parse_fault(text));
+}
+
+/// The course of paper C: a minute of open sky, half a minute of bad fixes under a bridge, a minute of tunnel, and
+/// fixes that are off when they come back.
+void set_tunnel(ScenarioConfig& c) {
+  c.motion.route = RouteKind::kTunnel;
+  c.duration_s = 210.0;
+  use_street_receiver(c.gnss);
+  add_faults(c, {"gnss.multipath@60+30:sigma_m=4,correlation_s=6,claim=0.5", "gnss.silence@90+60",
+                 "gnss.reacquire@150+12:error_m=4,decay_s=3"});
+}
+
+/// Ninety seconds of the same, for logs/demo.lcm.
+void set_demo(ScenarioConfig& c) {
+  set_tunnel(c);
+  c.faults.clear();
+  c.duration_s = 90.0;
+  c.gnss.rate_hz = 4.0;
+  add_faults(c, {"gnss.multipath@20+10:sigma_m=3,correlation_s=4,claim=0.6", "gnss.silence@30+30",
+                 "gnss.reacquire@60+8:error_m=3,decay_s=2"});
+}
+
+/// Half an hour among houses: correlated errors throughout, a bridge every four minutes, a tunnel every ten, slippery
+/// spots and steel that turns the magnetic field.
+void set_long_city(ScenarioConfig& c) {
+  c.motion.route = RouteKind::kLongCity;
+  c.duration_s = 1800.0;
+  use_street_receiver(c.gnss);
+  c.gnss.multipath_sigma_m = 0.6;
+  c.gnss.multipath_correlation_s = 15.0;
+  for (int i = 0; i < 7; ++i) {
+    const double start = 130.0 + 240.0 * i;
+    c.faults.emplace_back(*find_fault_type("gnss.multipath"), start, 12.0);
+    c.faults.emplace_back(*find_fault_type("wheels.slip"), start + 60.0, 1.5);
+    c.faults.emplace_back(*find_fault_type("mag.disturb"), start + 90.0, 6.0);
+  }
+  for (const double start : {300.0, 900.0, 1500.0}) {
+    c.faults.emplace_back(*find_fault_type("gnss.silence"), start, 40.0);
+    c.faults.emplace_back(*find_fault_type("gnss.reacquire"), start + 40.0, 12.0);
+  }
+}
+
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> all = {
       {"standing", "does not move",
@@ -40,11 +92,10 @@ const std::vector<Scenario>& scenarios() {
          c.motion.route = RouteKind::kColdStartMoving;
          c.duration_s = 120.0;
        }},
-      {"long_city", "half an hour of city streets",
-       [](ScenarioConfig& c) {
-         c.motion.route = RouteKind::kLongCity;
-         c.duration_s = 1800.0;
-       }},
+      {"tunnel_lit", "open sky, 30 s of bad fixes under a bridge, 60 s of lit tunnel", set_tunnel},
+      {"tunnel_dark", "the same with a dark tunnel", set_tunnel},
+      {"long_city", "half an hour of city streets, with bridges, tunnels, slip and disturbed fields", set_long_city},
+      {"demo", "90 s: open, bridge, tunnel, open; the drive of logs/demo.lcm", set_demo},
       {"corridor", "indoors at walking pace, without GNSS",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kCorridor;

@@ -28,11 +28,45 @@ enum class NoiseStream : std::uint64_t {
   kMagNoise = 17,
   kHardIron = 18,
   kSoftIron = 19,
+  kLink = 20,
+  kFault = 21,
 };
 
-inline RandomStream stream_of(const SimulatedDrive& drive, NoiseStream stream) {
-  return {drive.seed, static_cast<std::uint64_t>(stream)};
+/// `instance` tells sources of one kind apart, below 2^56.
+inline RandomStream stream_of(const SimulatedDrive& drive, NoiseStream stream, std::uint64_t instance = 0) {
+  return {drive.seed, static_cast<std::uint64_t>(stream) + (instance << 8U)};
 }
+
+/// A fault with random numbers of its own: they depend on the seed, its kind and its start alone.
+struct ActiveFault {
+  const Fault* fault;
+  RandomStream random;
+  const Fault* operator->() const { return fault; }
+};
+
+/// The faults of one sensor, in the order of the configuration.
+class FaultSet {
+ public:
+  FaultSet(const SimulatedDrive& drive, Sensor sensor) {
+    for (const Fault& f : drive.config.faults) {
+      if (f.sensor != sensor) continue;
+      const auto start_ms = static_cast<std::uint64_t>(f.start_s * 1e3);
+      const auto kind = static_cast<std::uint64_t>(f.kind) * 8U + static_cast<std::uint64_t>(sensor);
+      faults_.push_back({&f, stream_of(drive, NoiseStream::kFault, kind + (start_ms << 16U))});
+    }
+  }
+
+  /// Calls f(ActiveFault&) for those that are active t_s after the start of the drive.
+  template <class Function>
+  void for_each(double t_s, const Function& f) {
+    for (ActiveFault& fault : faults_) {
+      if (fault->active(t_s)) f(fault);
+    }
+  }
+
+ private:
+  std::vector<ActiveFault> faults_;
+};
 
 void simulate_imu(SimulatedDrive& drive);
 void simulate_gnss(SimulatedDrive& drive);

@@ -30,8 +30,19 @@ struct ImuBias {
 
 /// Measured minus true of the fix with the same index, enu axes at the antenna.
 struct GnssError {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< m; the effect of latency is not in it
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< m, faults included; the effect of latency is not in it
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s
+};
+
+/// How the sample with the same index came about and reached the log.
+struct Delivery {
+  std::int64_t seq = 0;         ///< counts what the sensor sent: a message lost on the way leaves a gap
+  std::int64_t true_us = 0;     ///< when it was measured; its stamp may differ
+  std::int64_t arrival_us = 0;  ///< when it was received
+};
+
+struct Deliveries {
+  std::vector<Delivery> imu, gnss, wheels, mag;
 };
 
 struct SimulationErrors {
@@ -59,6 +70,7 @@ struct SimulatedDrive {
   std::vector<MagSample> mag;
   std::vector<Odometry> truth;  ///< at config.truth_rate_hz, exact, covariance zero, T_frame_vehicle in enu
   SimulationErrors errors;
+  Deliveries deliveries;  ///< per sample, in order of measurement; not of arrival
 
   /// The truth at any time of the drive.
   [[nodiscard]] Odometry truth_at(std::int64_t t_us) const;

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "simulation/link.h"
 #include "simulation/sensors.h"
 
 namespace roadfix {
@@ -20,43 +21,76 @@ double ground_speed(const Kinematics& k) {
   return std::copysign(k.velocity_enu.norm(), forward.dot(k.velocity_enu));
 }
 
+/// True speeds with what faults do to the wheels themselves.
+void disturb(FaultSet& faults, double t_s, WheelSample& sample, double& noise_factor, bool& is_unsigned) {
+  faults.for_each(t_s, [&](ActiveFault& f) {
+    if (f->kind == FaultKind::kNoise) noise_factor *= f->get("factor");
+    if (f->kind == FaultKind::kUnsigned) is_unsigned = true;
+    for (int i = 0; i < sample.num_speeds; ++i) {
+      double& speed = sample.speeds[static_cast<std::size_t>(i)];
+      const bool driven = sample.num_speeds == 1 || i >= 2;
+      if (f->kind == FaultKind::kSlip && driven) speed *= 1.0 + f->get("ratio");
+      if (f->kind == FaultKind::kScale) speed *= 1.0 + f->get("ratio");
+      if (f->kind == FaultKind::kLock) speed = 0.0;
+    }
+  });
+}
+
+struct WheelErrorSource {
+  RandomStream noise;
+  RandomStream yaw_rate;
+};
+
+WheelErrorSource draw_errors(SimulatedDrive& drive) {
+  const WheelsConfig& c = drive.config.wheels;
+  WheelErrorSource source{stream_of(drive, NoiseStream::kWheelNoise), stream_of(drive, NoiseStream::kYawRate)};
+  RandomStream scale = stream_of(drive, NoiseStream::kWheelScale);
+  const double common = c.speed_scale_std * scale.normal();
+  const double own = c.layout == WheelLayout::kFourSpeeds ? c.wheel_scale_std : 0.0;
+  for (double& s : drive.errors.wheel_scale) s = common + own * scale.normal();
+  drive.errors.yaw_rate_bias = c.yaw_rate_bias_std_radps * source.yaw_rate.normal();
+  return source;
+}
+
+WheelSample measure(const SimulatedDrive& drive, std::int64_t t_us, FaultSet& faults, WheelErrorSource& source) {
+  const WheelsConfig& c = drive.config.wheels;
+  const Kinematics k = drive.motion->at(seconds_between(0, t_us));
+  const double speed = ground_speed(k);
+  WheelSample sample;
+  sample.t_us = drive.config.start_utime + t_us;
+  sample.num_speeds = c.layout == WheelLayout::kFourSpeeds ? 4 : 1;
+  sample.speeds[0] = speed;
+  if (sample.num_speeds == 4) sample.speeds = rolling_speeds(speed, k.angular_rate.z(), c);
+  double noise_factor = 1.0;
+  bool is_unsigned = c.signs == WheelSigns::kUnsigned;
+  disturb(faults, seconds_between(0, t_us), sample, noise_factor, is_unsigned);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(sample.num_speeds); ++i) {
+    double& s = sample.speeds[i];
+    s = s * (1.0 + drive.errors.wheel_scale[i]) + noise_factor * c.speed_noise_mps * source.noise.normal();
+    if (c.resolution_mps > 0.0) s = c.resolution_mps * std::round(s / c.resolution_mps);
+    if (is_unsigned || c.signs == WheelSigns::kGear) s = std::abs(s);
+  }
+  if (c.signs == WheelSigns::kGear)
+    sample.direction = speed < 0.0 ? WheelDirection::kReverse : WheelDirection::kForward;
+  if (is_unsigned) sample.direction = WheelDirection::kUnknown;
+  if (c.has_yaw_rate) {
+    sample.yaw_rate =
+        k.angular_rate.z() + drive.errors.yaw_rate_bias + c.yaw_rate_noise_radps * source.yaw_rate.normal();
+  }
+  return sample;
+}
+
 }  // namespace
 
 void simulate_wheels(SimulatedDrive& drive) {
   const WheelsConfig& c = drive.config.wheels;
   if (c.layout == WheelLayout::kNone) return;
-  RandomStream noise = stream_of(drive, NoiseStream::kWheelNoise);
-  RandomStream scale = stream_of(drive, NoiseStream::kWheelScale);
-  RandomStream yaw_rate = stream_of(drive, NoiseStream::kYawRate);
-  const double common = c.speed_scale_std * scale.normal();
-  const bool four = c.layout == WheelLayout::kFourSpeeds;
-  for (double& s : drive.errors.wheel_scale) s = common + (four ? c.wheel_scale_std * scale.normal() : 0.0);
-  drive.errors.yaw_rate_bias = c.yaw_rate_bias_std_radps * yaw_rate.normal();
-  const auto offset_us = static_cast<std::int64_t>(std::llround(c.clock_offset_s * 1e6));
+  WheelErrorSource source = draw_errors(drive);
+  FaultSet faults(drive, Sensor::kWheels);
   for (const std::int64_t t_us : sample_times(c.rate_hz, 0.0, drive.config.duration_s)) {
-    const Kinematics k = drive.motion->at(seconds_between(0, t_us));
-    const double speed = ground_speed(k);
-    WheelSample sample;
-    sample.t_us = drive.config.start_utime + t_us + offset_us;
-    sample.num_speeds = four ? 4 : 1;
-    if (four)
-      sample.speeds = rolling_speeds(speed, k.angular_rate.z(), c);
-    else
-      sample.speeds[0] = speed;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(sample.num_speeds); ++i) {
-      double& s = sample.speeds[i];
-      s = s * (1.0 + drive.errors.wheel_scale[i]) + c.speed_noise_mps * noise.normal();
-      if (c.resolution_mps > 0.0) s = c.resolution_mps * std::round(s / c.resolution_mps);
-      if (c.signs != WheelSigns::kSigned) s = std::abs(s);
-    }
-    if (c.signs == WheelSigns::kUnsigned) sample.direction = WheelDirection::kUnknown;
-    if (c.signs == WheelSigns::kGear)
-      sample.direction = speed < 0.0 ? WheelDirection::kReverse : WheelDirection::kForward;
-    if (c.has_yaw_rate) {
-      sample.yaw_rate = k.angular_rate.z() + drive.errors.yaw_rate_bias + c.yaw_rate_noise_radps * yaw_rate.normal();
-    }
-    drive.wheels.push_back(sample);
+    drive.wheels.push_back(measure(drive, t_us, faults, source));
   }
+  deliver<WheelSample, int>(drive, Sensor::kWheels, c.link, drive.wheels, nullptr, drive.deliveries.wheels);
 }
 
 }  // namespace roadfix

@@ -10,7 +10,7 @@ namespace roadfix {
 namespace {
 
 ScenarioConfig perfect(RouteKind route, double rate_hz) {
-  ScenarioConfig c = scenario("long_city");
+  ScenarioConfig c = scenario("city_loop");
   c.motion.route = route;
   c.duration_s = 600.0;
   c.imu = perfect_imu(rate_hz);

@@ -1,0 +1,317 @@
+// Every fault does what it says, within its time, to its sensor, and nothing else.
+#include "simulation/faults.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "simulation/scenarios.h"
+#include "simulation/simulate.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kStart = 30.0;
+constexpr double kDuration = 20.0;
+
+ScenarioConfig base() {
+  ScenarioConfig c = scenario("city_loop");
+  c.duration_s = 80.0;
+  return c;
+}
+
+SimulatedDrive drive_with(const std::string& fault, ScenarioConfig config = base()) {
+  config.faults.push_back(parse_fault(fault));
+  return simulate(config, 3);
+}
+
+/// What a message is made of: values, stamp, arrival.
+using Row = std::vector<double>;
+using Rows = std::map<std::int64_t, std::vector<Row>>;  // by the true time since the start
+
+void begin(Rows& rows, const SimulatedDrive& drive, std::int64_t stamp, const Delivery& d, const Row& values) {
+  const std::int64_t start = drive.config.start_utime;
+  Row row = values;
+  row.push_back(static_cast<double>(stamp - start));
+  row.push_back(static_cast<double>(d.arrival_us - start));
+  rows[d.true_us - start].push_back(row);
+}
+
+Rows rows_of(const SimulatedDrive& drive, Sensor sensor) {
+  Rows rows;
+  if (sensor == Sensor::kImu) {
+    for (std::size_t i = 0; i < drive.imu.size(); ++i) {
+      const ImuSample& s = drive.imu[i];
+      begin(rows, drive, s.t_us, drive.deliveries.imu[i],
+            {s.gyro.x(), s.gyro.y(), s.gyro.z(), s.accel.x(), s.accel.y(), s.accel.z()});
+    }
+  } else if (sensor == Sensor::kGnss) {
+    for (std::size_t i = 0; i < drive.gnss.size(); ++i) {
+      const GnssFix& s = drive.gnss[i];
+      Row row = {s.antenna.latitude, s.antenna.longitude, s.antenna.height,
+                 s.cov_enu(0, 0),    s.cov_enu(2, 2),     double(int(s.fix_type))};
+      if (s.velocity) {
+        row.insert(row.end(), s.velocity->enu.begin(), s.velocity->enu.end());
+        row.push_back(s.velocity->cov_enu(0, 0));
+      }
+      begin(rows, drive, s.t_us, drive.deliveries.gnss[i], row);
+    }
+  } else if (sensor == Sensor::kWheels) {
+    for (std::size_t i = 0; i < drive.wheels.size(); ++i) {
+      const WheelSample& s = drive.wheels[i];
+      Row row(s.speeds.begin(), s.speeds.end());
+      row.push_back(double(int(s.direction)));
+      begin(rows, drive, s.t_us, drive.deliveries.wheels[i], row);
+    }
+  } else {
+    for (std::size_t i = 0; i < drive.mag.size(); ++i) {
+      const MagSample& s = drive.mag[i];
+      begin(rows, drive, s.t_us, drive.deliveries.mag[i], {s.field.x(), s.field.y(), s.field.z()});
+    }
+  }
+  return rows;
+}
+
+Rows outside_window(Rows rows) {
+  std::erase_if(rows, [](const auto& row) {
+    const double t_s = static_cast<double>(row.first) * 1e-6;
+    return t_s >= kStart && t_s < kStart + kDuration;
+  });
+  return rows;
+}
+
+TEST_CASE("every fault changes its own sensor, within its time only") {
+  const SimulatedDrive before = simulate(base(), 3);
+  for (const FaultType& type : fault_types()) {
+    CAPTURE(type.name);
+    Fault fault(type, kStart, kDuration);
+    for (std::size_t i = 0; i < type.parameters.size(); ++i) {
+      if (fault.values[i] == 0.0) fault.values[i] = 0.5;  // an addend of zero would be no fault
+    }
+    const SimulatedDrive after = drive_with(fault_text(fault));
+    for (const Sensor sensor : {Sensor::kImu, Sensor::kGnss, Sensor::kWheels, Sensor::kMag}) {
+      const Rows a = rows_of(before, sensor);
+      const Rows b = rows_of(after, sensor);
+      if (sensor == type.sensor) {
+        CHECK(a != b);
+        CHECK(outside_window(a) == outside_window(b));
+      } else {
+        CHECK(a == b);
+      }
+    }
+    CHECK(before.truth.size() == after.truth.size());
+    CHECK(before.truth.back().T_frame_vehicle.p == after.truth.back().T_frame_vehicle.p);
+  }
+}
+
+TEST_CASE("errors and deliveries stay aligned with the samples") {
+  ScenarioConfig config = base();
+  for (const char* text : {"imu.drop@10", "imu.silence@40+5", "gnss.drop@0", "gnss.repeat@0", "wheels.repeat@5"}) {
+    config.faults.push_back(parse_fault(text));
+  }
+  const SimulatedDrive drive = simulate(config, 3);
+  CHECK(drive.imu.size() == drive.errors.imu_bias.size());
+  CHECK(drive.imu.size() == drive.deliveries.imu.size());
+  CHECK(drive.gnss.size() == drive.errors.gnss.size());
+  for (std::size_t i = 0; i < drive.gnss.size(); ++i) {
+    const Kinematics k = drive.kinematics_at(drive.deliveries.gnss[i].true_us);
+    const Eigen::Vector3d error = drive.anchor.enu(drive.gnss[i].antenna) - k.T_enu_vehicle * config.gnss.lever_arm_m;
+    REQUIRE((error - drive.errors.gnss[i].position).norm() < 1e-5);
+  }
+}
+
+/// Differences fault minus none of the GNSS position, for fixes within the fault's time.
+std::vector<Eigen::Vector3d> moved_by(const std::string& fault) {
+  const SimulatedDrive before = simulate(base(), 3);
+  const SimulatedDrive after = drive_with(fault);
+  std::vector<Eigen::Vector3d> moved;
+  for (std::size_t i = 0; i < before.gnss.size(); ++i) {
+    const double t_s = seconds_between(before.config.start_utime, before.gnss[i].t_us);
+    if (t_s < kStart || t_s >= kStart + kDuration) continue;
+    moved.push_back(before.anchor.enu(after.gnss[i].antenna) - before.anchor.enu(before.gnss[i].antenna));
+  }
+  return moved;
+}
+
+TEST_CASE("gnss faults move the fixes as they say") {
+  for (const Eigen::Vector3d& d : moved_by("gnss.bias@30+20:east_m=15,up_m=-2")) {
+    CHECK((d - Eigen::Vector3d(15.0, 0.0, -2.0)).norm() < 1e-2);
+  }
+  const auto ramp = moved_by("gnss.ramp@30+20:east_mps=0,north_mps=0.5");
+  CHECK(ramp.front().norm() < 1e-6);
+  CHECK((ramp.back() - Eigen::Vector3d(0.0, 9.9, 0.0)).norm() < 1e-2);
+  const auto back = moved_by("gnss.reacquire@30+20:error_m=8,decay_s=5");
+  CHECK(back.front().head<2>().norm() == Approx(8.0).epsilon(1e-3));
+  CHECK(back[25].head<2>().norm() == Approx(8.0 * std::exp(-1.0)).epsilon(1e-3));
+  CHECK(back[25].normalized().dot(back.front().normalized()) > 0.9999);
+}
+
+TEST_CASE("multipath is as large and as correlated as it says, single, and its sigma claims what it should") {
+  ScenarioConfig config = base();
+  config.duration_s = 2000.0;
+  const std::string text = "gnss.multipath@0:sigma_m=4,correlation_s=6,velocity_sigma_mps=0.3,claim=0.5";
+  const SimulatedDrive drive = drive_with(text, config);
+  double sum = 0.0;
+  double lagged = 0.0;
+  double speed = 0.0;
+  for (std::size_t i = 0; i + 30 < drive.gnss.size(); ++i) {
+    const Eigen::Vector3d& e = drive.errors.gnss[i].position;
+    sum += e.head<2>().squaredNorm();
+    lagged += e.head<2>().dot(drive.errors.gnss[i + 30].position.head<2>());
+    speed += drive.errors.gnss[i].velocity.squaredNorm();
+  }
+  const double n = static_cast<double>(drive.gnss.size() - 30);
+  CHECK(std::sqrt(sum / (2.0 * n)) == Approx(4.0).epsilon(0.15));
+  CHECK(lagged / sum == Approx(std::exp(-1.0)).margin(0.12));
+  CHECK(std::sqrt(speed / (3.0 * n)) == Approx(std::hypot(0.3, 0.03)).epsilon(0.05));
+  CHECK(drive.gnss[50].fix_type == FixType::kSingle);
+  CHECK(std::sqrt(drive.gnss[50].cov_enu(0, 0)) == Approx(0.5 * 4.0).epsilon(0.01));
+}
+
+TEST_CASE("a claim lies about sigma alone") {
+  const SimulatedDrive before = simulate(base(), 3);
+  const SimulatedDrive after = drive_with("gnss.claim@0:factor=0.1");
+  CHECK(std::sqrt(after.gnss[9].cov_enu(0, 0)) == Approx(0.1 * std::sqrt(before.gnss[9].cov_enu(0, 0))));
+  CHECK(after.gnss[9].antenna.latitude == before.gnss[9].antenna.latitude);
+}
+
+TEST_CASE("latency gives where the antenna was") {
+  ScenarioConfig config = base();
+  config.gnss.sigma_horizontal_m = config.gnss.sigma_up_m = 1e-6;
+  const SimulatedDrive drive = drive_with("gnss.latency@0:position_s=0.2,velocity_s=0", config);
+  for (std::size_t i = 2; i < drive.gnss.size(); i += 7) {
+    const SE3 then = drive.kinematics_at(drive.gnss[i].t_us - 200'000).T_enu_vehicle;
+    REQUIRE((drive.anchor.enu(drive.gnss[i].antenna) - then * config.gnss.lever_arm_m).norm() < 1e-4);
+  }
+}
+
+TEST_CASE("wheels slip, lock, scale and lose their sign") {
+  ScenarioConfig config = base();
+  config.motion.route = RouteKind::kCarPark;
+  config.wheels.speed_noise_mps = config.wheels.speed_scale_std = config.wheels.wheel_scale_std = 0.0;
+  const SimulatedDrive before = simulate(config, 3);
+  const SimulatedDrive slip = drive_with("wheels.slip@0:ratio=0.2", config);
+  const SimulatedDrive lock = drive_with("wheels.lock@0", config);
+  const SimulatedDrive scale = drive_with("wheels.scale@0:ratio=0.03", config);
+  const SimulatedDrive magnitude = drive_with("wheels.unsigned@0", config);
+  double slowest = 0.0;
+  for (std::size_t i = 0; i < before.wheels.size(); ++i) {
+    const auto& v = before.wheels[i].speeds;
+    slowest = std::min(slowest, v[2]);
+    CHECK(slip.wheels[i].speeds[0] == v[0]);
+    CHECK(slip.wheels[i].speeds[2] == Approx(1.2 * v[2]).margin(1e-12));
+    CHECK(scale.wheels[i].speeds[1] == Approx(1.03 * v[1]).margin(1e-12));
+    CHECK(std::abs(lock.wheels[i].speeds[3]) == 0.0);
+    CHECK(magnitude.wheels[i].speeds[2] == std::abs(v[2]));
+    CHECK(magnitude.wheels[i].direction == WheelDirection::kUnknown);
+  }
+  CHECK(slowest < -1.0);
+}
+
+TEST_CASE("imu bias, noise and saturation") {
+  const SimulatedDrive before = simulate(base(), 3);
+  const SimulatedDrive bias = drive_with("imu.bias@0:gyro_z_radps=0.02,accel_x_mps2=0.3");
+  const SimulatedDrive clipped = drive_with("imu.saturation@0:gyro_radps=0.1,accel_mps2=9");
+  double fastest = 0.0;
+  for (std::size_t i = 0; i < before.imu.size(); ++i) {
+    CHECK(bias.imu[i].gyro.z() - before.imu[i].gyro.z() == Approx(0.02).margin(1e-12));
+    CHECK(bias.imu[i].accel.x() - before.imu[i].accel.x() == Approx(0.3).margin(1e-12));
+    CHECK(bias.errors.imu_bias[i].gyro.z() - before.errors.imu_bias[i].gyro.z() == Approx(0.02).margin(1e-12));
+    CHECK(clipped.imu[i].gyro.cwiseAbs().maxCoeff() <= 0.1);
+    CHECK(clipped.imu[i].accel.z() <= 9.0);
+    fastest = std::max(fastest, before.imu[i].gyro.z());
+  }
+  CHECK(fastest > 0.2);
+}
+
+TEST_CASE("a disturbed field is added in vehicle axes") {
+  const SimulatedDrive before = simulate(base(), 3);
+  const SimulatedDrive after = drive_with("mag.disturb@0:x_ut=20,y_ut=0,z_ut=-5");
+  const Eigen::Vector3d added = (after.mag[700].field - before.mag[700].field) * 1e6;
+  CHECK((added - Eigen::Vector3d(20.0, 0.0, -5.0)).norm() < 1e-9);
+}
+
+TEST_CASE("silence leaves no gap in seq and loss does") {
+  const auto gaps = [](const std::vector<Delivery>& d) {
+    int n = 0;
+    for (std::size_t i = 1; i < d.size(); ++i) n += d[i].seq != d[i - 1].seq + 1;
+    return n;
+  };
+  const SimulatedDrive silent = drive_with("gnss.silence@30+20");
+  const SimulatedDrive lossy = drive_with("gnss.drop@30+20:probability=0.5");
+  CHECK(gaps(silent.deliveries.gnss) == 0);
+  CHECK(silent.gnss.size() == 401 - 100);
+  CHECK(gaps(lossy.deliveries.gnss) > 10);
+  CHECK(lossy.gnss.size() == Approx(401 - 50).margin(20));
+}
+
+TEST_CASE("what is stuck repeats its last values under new stamps") {
+  const SimulatedDrive drive = drive_with("imu.stuck@30+20");
+  std::size_t same = 0;
+  for (std::size_t i = 1; i < drive.imu.size(); ++i) {
+    same += drive.imu[i].gyro == drive.imu[i - 1].gyro ? 1U : 0U;
+    REQUIRE(drive.imu[i].t_us > drive.imu[i - 1].t_us);
+  }
+  CHECK(same == 2000);
+}
+
+TEST_CASE("clock and jitter move stamps, not the truth") {
+  const SimulatedDrive offset = drive_with("imu.clock@30+20:offset_s=0.04");
+  CHECK(offset.imu[3500].t_us - offset.deliveries.imu[3500].true_us == 40'000);
+  CHECK(offset.imu[2000].t_us == offset.deliveries.imu[2000].true_us);
+  const SimulatedDrive jitter = drive_with("imu.jitter@0:sigma_s=0.002");
+  double sum = 0.0;
+  for (std::size_t i = 0; i < jitter.imu.size(); ++i) {
+    sum += std::pow(seconds_between(jitter.deliveries.imu[i].true_us, jitter.imu[i].t_us), 2);
+  }
+  CHECK(std::sqrt(sum / static_cast<double>(jitter.imu.size())) == Approx(0.002).epsilon(0.03));
+}
+
+TEST_CASE("a jittering delay puts arrivals out of order, the normal link does not") {
+  const auto disorder = [](const std::vector<Delivery>& d) {
+    int n = 0;
+    for (std::size_t i = 1; i < d.size(); ++i) n += d[i].arrival_us < d[i - 1].arrival_us;
+    return n;
+  };
+  CHECK(disorder(simulate(base(), 3).deliveries.imu) == 0);
+  CHECK(disorder(drive_with("imu.delay@30+20:delay_s=0.01,jitter_s=0.05").deliveries.imu) > 100);
+}
+
+TEST_CASE("clock offset and drift of a link") {
+  ScenarioConfig config = base();
+  config.gnss.link.clock_offset_s = -0.1;
+  config.gnss.link.clock_drift_ppm = 1000.0;
+  const SimulatedDrive drive = simulate(config, 3);
+  const Delivery& last = drive.deliveries.gnss.back();
+  CHECK(drive.gnss.back().t_us - last.true_us == -100'000 + 80'000);
+}
+
+TEST_CASE("faults as text: both ways, and errors that say what may be there") {
+  const Fault fault = parse_fault("gnss.bias@30+5:east_m=15");
+  CHECK(fault.sensor == Sensor::kGnss);
+  CHECK(fault.start_s == 30.0);
+  CHECK(fault.duration_s == 5.0);
+  CHECK(fault.get("east_m") == 15.0);
+  CHECK(fault_text(fault) == "gnss.bias@30+5:east_m=15,north_m=0,up_m=0");
+  CHECK(fault_text(parse_fault("imu.silence@2.5")) == "imu.silence@2.5");
+  const auto error = [](const std::string& text) -> std::string {
+    try {
+      parse_fault(text);
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return "";
+  };
+  using Catch::Matchers::Contains;
+  CHECK_THAT(error("gnss.bias"), Contains("@START"));
+  CHECK_THAT(error("gnss.nonsense@3"), Contains("no fault of this name"));
+  CHECK_THAT(error("gnss.bias@3:east=4"), Contains("east_m, north_m, up_m"));
+  CHECK_THAT(error("gnss.bias@x"), Contains("\"x\" is no number"));
+  CHECK_THAT(error("gnss.drop@1:probability=2"), Contains("within [0"));
+  CHECK_THAT(error("gnss.bias@3+-4"), Contains("not negative"));
+}
+
+}  // namespace
+}  // namespace roadfix
