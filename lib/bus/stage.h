@@ -17,21 +17,9 @@
 
 #include "bus/message.h"
 #include "stream/digest.h"
+#include "stream/spec.h"
 
 namespace roadfix {
-
-struct InputSpec {
-  std::string channel;
-  std::string type;             ///< for example "imu_t"
-  int64_t lateness_us = 0;      ///< how far behind the clock it may arrive and still count
-  int64_t effect_delay_us = 0;  ///< feedback: applied at utime + this, and refused when it comes later than that
-};
-
-/// A channel that may drive the stage's time; the next in the list takes over where it is silent for its time-out.
-struct ClockSpec {
-  int input = 0;           ///< index into StageSpec::inputs
-  int64_t timeout_us = 0;  ///< in data time
-};
 
 struct OutputSpec {
   std::string channel;

@@ -1,0 +1,32 @@
+/// The messages of a log in the order of their own time.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bus/log_reader.h"
+#include "bus/message.h"
+
+namespace roadfix {
+
+struct IndexedMessage {
+  Header header;
+  int channel = 0;  ///< index into LogIndex::channels
+  uint64_t offset = 0;
+};
+
+struct LogIndex {
+  std::vector<std::string> channels;  ///< sorted
+  /// In the order (utime, channel, run, seq, place in the file). A message too short for a header has the utime of its
+  /// event, run and seq 0.
+  std::vector<IndexedMessage> messages;
+
+  /// -1 where the log has no such channel.
+  [[nodiscard]] int channel(const std::string& name) const;
+};
+
+/// Reads every event's head, from the reader's beginning; damage is then known to the reader.
+LogIndex index_log(LogReader& reader, const std::function<bool(std::string_view channel)>& wanted);
+
+}  // namespace roadfix

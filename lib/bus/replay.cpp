@@ -1,0 +1,197 @@
+#include "bus/replay.h"
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "bus/log_index.h"
+#include "bus/log_writer.h"
+
+namespace roadfix {
+
+namespace {
+
+class Replayer : public MessageSink {
+ public:
+  Replayer(const std::filesystem::path& in, const std::filesystem::path& out,
+           std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options);
+  ReplaySummary run();
+
+ private:
+  /// A message for one input of one stage.
+  struct Delivery {
+    int order = 0;
+    int input = 0;
+    std::span<const uint8_t> bytes;
+    std::vector<uint8_t> own;  // what `bytes` points to, unless that is the log
+  };
+  struct Route {
+    std::size_t stage = 0;
+    int input = 0;
+    int order = 0;
+  };
+  struct Write {
+    std::string channel;
+    int64_t seq = 0;
+    std::vector<uint8_t> bytes;
+  };
+
+  void route(std::size_t stage);
+  void require_clock(const StageRunner& runner) const;
+  void dispatch(std::size_t begin, std::size_t end);
+  void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) override;
+  void write_group();
+  ReplaySummary summary() const;
+
+  const ReplayOptions& options_;
+  LogReader reader_;
+  LogWriter writer_;
+  std::vector<std::unique_ptr<StageRunner>> runners_;
+  std::map<std::string, std::vector<Route>> routes_;
+  std::map<std::string, std::size_t> producers_;
+  LogIndex index_;
+  std::vector<std::vector<Delivery>> inboxes_;
+  std::vector<Write> writes_;
+  int64_t utime_ = 0;
+  ReplaySummary summary_;
+};
+
+Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path& out,
+                   std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options)
+    : options_(options), reader_(in), writer_(out), inboxes_(stages.size()) {
+  for (std::unique_ptr<Stage>& stage : stages) {
+    runners_.push_back(std::make_unique<StageRunner>(std::move(stage), *this));
+    if (options.timing) runners_.back()->measure_time();
+    route(runners_.size() - 1);
+  }
+  index_ = index_log(reader_, [&](std::string_view channel) {
+    const std::string name(channel);
+    const auto& copied = options_.copied_channels;
+    return (routes_.contains(name) && !producers_.contains(name)) ||
+           std::find(copied.begin(), copied.end(), name) != copied.end();
+  });
+  for (const auto& runner : runners_) require_clock(*runner);
+}
+
+/// At one utime a stage gets its clocks last, the most preferred at the very end: what is as old as a clock sample is
+/// there before it, as the lateness promises.
+void Replayer::route(std::size_t stage) {
+  const StageSpec& spec = runners_[stage]->spec();
+  for (int input = 0; input < static_cast<int>(spec.inputs.size()); ++input) {
+    Route route{stage, input, 0};
+    for (std::size_t i = 0; i < spec.clocks.size(); ++i) {
+      if (spec.clocks[i].input == input) route.order = static_cast<int>(spec.clocks.size() - i);
+    }
+    routes_[spec.inputs[static_cast<std::size_t>(input)].channel].push_back(route);
+  }
+  for (const OutputSpec& output : spec.outputs) {
+    if (!producers_.emplace(output.channel, stage).second) {
+      throw std::logic_error("two stages publish " + output.channel);
+    }
+  }
+}
+
+void Replayer::require_clock(const StageRunner& runner) const {
+  std::string clocks;
+  for (const ClockSpec& clock : runner.spec().clocks) {
+    const std::string& channel = runner.spec().inputs[static_cast<std::size_t>(clock.input)].channel;
+    if (producers_.contains(channel) || index_.channel(channel) >= 0) return;
+    clocks += (clocks.empty() ? "" : ", ") + channel;
+  }
+  throw std::runtime_error(reader_.path().string() + ": " + runner.spec().name + " needs a message on " + clocks +
+                           ", and the log has none");
+}
+
+ReplaySummary Replayer::run() {
+  const std::vector<IndexedMessage>& messages = index_.messages;
+  std::size_t next_report = 0;
+  for (std::size_t begin = 0, end = 0; begin < messages.size(); begin = end) {
+    utime_ = messages[begin].header.utime;
+    while (end < messages.size() && messages[end].header.utime == utime_) ++end;
+    dispatch(begin, end);
+    if (options_.progress && begin >= next_report) {
+      options_.progress(static_cast<double>(begin) / static_cast<double>(messages.size()));
+      next_report = begin + messages.size() / 100 + 1;
+    }
+  }
+  writer_.commit();
+  if (options_.progress) options_.progress(1.0);
+  return summary();
+}
+
+/// All messages of one utime, stage by stage.
+void Replayer::dispatch(std::size_t begin, std::size_t end) {
+  const auto& copied = options_.copied_channels;
+  for (std::size_t i = begin; i < end; ++i) {
+    const IndexedMessage& message = index_.messages[i];
+    const std::string& channel = index_.channels[static_cast<std::size_t>(message.channel)];
+    const std::span<const uint8_t> data = reader_.at(message.offset).data;
+    if (std::find(copied.begin(), copied.end(), channel) != copied.end()) {
+      writes_.push_back({channel, message.header.seq, {data.begin(), data.end()}});
+    }
+    const auto found = routes_.find(channel);
+    if (found == routes_.end() || producers_.contains(channel)) continue;
+    for (const Route& route : found->second) inboxes_[route.stage].push_back({route.order, route.input, data, {}});
+  }
+  for (std::size_t stage = 0; stage < runners_.size(); ++stage) {
+    std::vector<Delivery>& inbox = inboxes_[stage];
+    std::stable_sort(inbox.begin(), inbox.end(),
+                     [](const Delivery& a, const Delivery& b) { return a.order < b.order; });
+    for (const Delivery& delivery : inbox) runners_[stage]->offer(delivery.input, delivery.bytes);
+    summary_.messages += static_cast<int64_t>(inbox.size());
+    inbox.clear();
+  }
+  write_group();
+}
+
+void Replayer::put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) {
+  if (header.utime != utime_) throw std::logic_error(channel + ": an output that is not for now");
+  writes_.push_back({channel, header.seq, {bytes.begin(), bytes.end()}});
+  const auto found = routes_.find(channel);
+  if (found == routes_.end()) return;
+  for (const Route& route : found->second) {
+    Delivery delivery{route.order, route.input, {}, {bytes.begin(), bytes.end()}};
+    delivery.bytes = delivery.own;
+    inboxes_[route.stage].push_back(std::move(delivery));
+  }
+}
+
+void Replayer::write_group() {
+  std::stable_sort(writes_.begin(), writes_.end(), [](const Write& a, const Write& b) {
+    return std::tie(a.channel, a.seq) < std::tie(b.channel, b.seq);
+  });
+  for (const Write& write : writes_) writer_.write(write.channel, utime_, write.bytes);
+  summary_.outputs += static_cast<int64_t>(writes_.size());
+  writes_.clear();
+}
+
+ReplaySummary Replayer::summary() const {
+  ReplaySummary summary = summary_;
+  if (!index_.messages.empty()) {
+    const int64_t span_us = index_.messages.back().header.utime - index_.messages.front().header.utime;
+    summary.data_s = static_cast<double>(span_us) * 1e-6;
+  }
+  summary.damage = reader_.damage();
+  for (const auto& runner : runners_) {
+    const StageSpec& spec = runner->spec();
+    for (std::size_t i = 0; i < spec.inputs.size(); ++i) {
+      const InputCounters& counters = runner->stream().track(static_cast<int>(i)).counters;
+      summary.inputs.push_back({spec.name, spec.inputs[i].channel, counters});
+    }
+    if (runner->timing() == nullptr) continue;
+    for (HandlerTiming::Row& row : runner->timing()->rows()) summary.timing.push_back(std::move(row));
+  }
+  return summary;
+}
+
+}  // namespace
+
+ReplaySummary replay(const std::filesystem::path& in, const std::filesystem::path& out,
+                     std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options) {
+  if (std::error_code ignored; std::filesystem::equivalent(in, out, ignored)) {
+    throw std::runtime_error(out.string() + ": the output would replace the input");
+  }
+  return Replayer(in, out, std::move(stages), options).run();
+}
+
+}  // namespace roadfix

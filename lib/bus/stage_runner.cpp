@@ -1,0 +1,140 @@
+#include "bus/stage_runner.h"
+
+#include <cctype>
+#include <cstring>
+#include <stdexcept>
+
+namespace roadfix {
+
+namespace {
+
+/// Behind the handlers of the inputs come these two.
+std::vector<std::string> handler_names(const StageSpec& spec) {
+  std::vector<std::string> names;
+  for (const InputSpec& input : spec.inputs) names.push_back(spec.name + " apply " + input.channel);
+  names.push_back(spec.name + " on_clock");
+  names.push_back(spec.name + " publish");
+  return names;
+}
+
+}  // namespace
+
+std::string stage_channel(const std::string& prefix, const std::string& stage_name) {
+  std::string channel = prefix;
+  for (const char c : stage_name) channel += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return channel;
+}
+
+StageRunner::StageRunner(std::unique_ptr<Stage> stage, MessageSink& sink)
+    : stage_(std::move(stage)),
+      sink_(sink),
+      stream_(stage_->spec().inputs, stage_->spec().clocks),
+      next_seq_(stage_->spec().outputs.size()),
+      ledger_channel_(stage_channel("LEDGER_", stage_->spec().name)) {
+  for (const InputSpec& input : spec().inputs) checks_.push_back(Schema::built_in().check_of(input.type));
+  for (const OutputSpec& output : spec().outputs) static_cast<void>(Schema::built_in().type(output.type));
+  for (const ClockSpec& clock : spec().clocks) {
+    if (clock.input < 0 || clock.input >= static_cast<int>(spec().inputs.size())) {
+      throw std::logic_error(spec().name + ": a clock names input " + std::to_string(clock.input));
+    }
+  }
+  if (spec().clocks.empty()) throw std::logic_error(spec().name + ": names no clock");
+}
+
+HandlerTiming& StageRunner::measure_time() {
+  timing_ = std::make_unique<HandlerTiming>(handler_names(spec()));
+  return *timing_;
+}
+
+Offer StageRunner::offer(int input, std::span<const uint8_t> bytes) {
+  const MessageCheck& check = checks_[static_cast<std::size_t>(input)];
+  const CheckResult result = check(bytes);
+  if (result != CheckResult::kOk) {
+    // With the wrong fingerprint the bytes behind it name nothing.
+    std::optional<EventId> id;
+    const std::optional<Header> header = read_header(bytes);
+    if (header && result != CheckResult::kWrongType) id = EventId{header->utime, header->run, header->seq};
+    stream_.note_undecodable(input, id);
+    return Offer::kRefused;
+  }
+  const Header header = *read_header(bytes);
+  const Offer offer = stream_.offer(input, {header.utime, header.run, header.seq}, bytes);
+  if (offer == Offer::kTick) tick({input, header.utime, header.run, header.seq, bytes});
+  return offer;
+}
+
+void StageRunner::tick(const Message& sample) {
+  const auto handlers = spec().inputs.size();
+  {
+    const HandlerTiming::Scope scope(timing_.get(), handlers);
+    stage_->on_clock(sample);
+  }
+  if (stream_.resumes_at()) return;  // published by the run that the state is from
+  while (const WaitingInput* waiting = stream_.next()) {
+    const HandlerTiming::Scope scope(timing_.get(), static_cast<std::size_t>(waiting->input));
+    stage_->apply({waiting->input, waiting->id.utime, waiting->id.run, waiting->id.seq, waiting->bytes});
+  }
+  stream_.close_tick();
+  now_utime_ = sample.utime;
+  provenance_current_ = false;
+  publish_ledger();
+  const HandlerTiming::Scope scope(timing_.get(), handlers + 1);
+  stage_->publish(now_utime_, *this);
+}
+
+Header StageRunner::stamp(int output) {
+  return {now_utime_, *stream_.run(), next_seq_.at(static_cast<std::size_t>(output))++};
+}
+
+/// The same for all outputs of one tick.
+const provenance_t& StageRunner::provenance() {
+  if (provenance_current_) return provenance_;
+  digest_.clear();
+  digest_.add(static_cast<int64_t>(stream_.input_digest()));
+  stage_->digest(digest_);
+  provenance_.digest = static_cast<int64_t>(digest_.value());
+  provenance_.ledger_entries = stream_.ledger_total();
+  const std::size_t inputs = spec().inputs.size();
+  provenance_.num_inputs = static_cast<int32_t>(inputs);
+  provenance_.last_seq.resize(inputs);
+  provenance_.num_applied.resize(inputs);
+  for (std::size_t i = 0; i < inputs; ++i) {
+    const std::optional<InputTrack::Applied>& applied = stream_.track(static_cast<int>(i)).applied;
+    provenance_.last_seq[i] = applied ? applied->seq : -1;
+    provenance_.num_applied[i] = applied ? applied->count : 0;
+  }
+  provenance_current_ = true;
+  return provenance_;
+}
+
+void StageRunner::send(int output, const char* type, std::span<const uint8_t> bytes) {
+  const OutputSpec& declared = spec().outputs.at(static_cast<std::size_t>(output));
+  if (declared.type != type) throw std::logic_error(spec().name + ": " + declared.channel + " is no " + type);
+  sink_.put(declared.channel, *read_header(bytes), bytes);
+}
+
+/// Before the outputs that the new entries affect.
+void StageRunner::publish_ledger() {
+  if (stream_.ledger().total() == ledger_published_) return;
+  ledger_published_ = stream_.ledger().total();
+  ledger_t ledger{};
+  ledger.utime = now_utime_;
+  ledger.run = *stream_.run();
+  ledger.seq = next_ledger_seq_++;
+  ledger.num_entries_total = ledger_published_;
+  for (const LedgerEntry& from : stream_.ledger().recent()) {
+    ledger_entry_t& to = ledger.entries.emplace_back();
+    to.entry = from.entry;
+    to.at_clock_utime = from.at_clock_utime;
+    to.kind = static_cast<int8_t>(from.kind);
+    to.channel = spec().inputs[static_cast<std::size_t>(from.input)].channel;
+    to.input_run = from.run;
+    to.first_seq = from.first_seq;
+    to.last_seq = from.last_seq;
+    to.input_utime = from.utime;
+  }
+  ledger.num_entries = static_cast<int32_t>(ledger.entries.size());
+  sink_.put(ledger_channel_, {ledger.utime, ledger.run, ledger.seq}, encode(ledger));
+}
+
+}  // namespace roadfix

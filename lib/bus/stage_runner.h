@@ -1,0 +1,65 @@
+/// Runs one stage: check, order, apply, publish. The one path that live, replay and verify share.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <roadfix/ledger_t.hpp>
+#include <string>
+#include <vector>
+
+#include "bus/handler_timing.h"
+#include "bus/schema.h"
+#include "bus/stage.h"
+#include "stream/input_stream.h"
+
+namespace roadfix {
+
+/// Where messages go: a bus, a log, the next stage.
+class MessageSink {
+ public:
+  virtual ~MessageSink() = default;
+  virtual void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) = 0;
+};
+
+class StageRunner : private Outputs {
+ public:
+  /// Throws std::logic_error where the spec contradicts itself or names an unknown type.
+  StageRunner(std::unique_ptr<Stage> stage, MessageSink& sink);
+
+  /// Takes one message as it came; whatever it is, this does not throw for it.
+  Offer offer(int input, std::span<const uint8_t> bytes);
+
+  [[nodiscard]] const StageSpec& spec() const { return stage_->spec(); }
+  [[nodiscard]] const Stage& stage() const { return *stage_; }
+  [[nodiscard]] const InputStream& stream() const { return stream_; }
+  /// Off until this is called.
+  HandlerTiming& measure_time();
+  [[nodiscard]] const HandlerTiming* timing() const { return timing_.get(); }
+
+ private:
+  Header stamp(int output) override;
+  const provenance_t& provenance() override;
+  void send(int output, const char* type, std::span<const uint8_t> bytes) override;
+
+  void tick(const Message& sample);
+  void publish_ledger();
+
+  std::unique_ptr<Stage> stage_;
+  MessageSink& sink_;
+  InputStream stream_;
+  std::vector<MessageCheck> checks_;
+  std::vector<int64_t> next_seq_;
+  std::string ledger_channel_;
+  int64_t next_ledger_seq_ = 0;
+  int64_t ledger_published_ = 0;
+  int64_t now_utime_ = 0;
+  provenance_t provenance_;
+  bool provenance_current_ = false;
+  Digest digest_;
+  std::unique_ptr<HandlerTiming> timing_;
+};
+
+/// "LEDGER_" + GNSS_INS_EKF: the channels that every stage has beside its outputs.
+std::string stage_channel(const std::string& prefix, const std::string& stage_name);
+
+}  // namespace roadfix

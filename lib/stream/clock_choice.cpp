@@ -1,0 +1,57 @@
+#include "stream/clock_choice.h"
+
+#include <algorithm>
+
+namespace roadfix {
+
+ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<bool> changes) {
+  int position = 0;
+  while (position < static_cast<int>(clocks_.size()) && clocks_[static_cast<std::size_t>(position)].input != input) {
+    ++position;
+  }
+  if (position == static_cast<int>(clocks_.size())) return Verdict::kInput;
+  if (!first_utime_) first_utime_ = utime;
+  std::optional<int64_t>& newest = newest_utime_[static_cast<std::size_t>(position)];
+  newest = newest ? std::max(*newest, utime) : utime;
+
+  const bool ahead = !utime_ || utime > *utime_;
+  const bool preferred = active_ < 0 ? position == 0 : position <= active_;
+  bool ticks = false;
+  if (position == active_) {
+    ticks = ahead;
+  } else if (changes) {
+    ticks = ahead && *changes;
+  } else {
+    ticks = ahead && (preferred || may_take_over(position, utime));
+  }
+  if (ticks) {
+    changed_ = position != active_;
+    active_ = position;
+    utime_ = utime;
+    return Verdict::kTick;
+  }
+  return preferred && !ahead ? Verdict::kRefused : Verdict::kInput;
+}
+
+bool ClockChoice::may_take_over(int position, int64_t utime) const {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(position); ++i) {
+    if (utime - newest_utime_[i].value_or(*first_utime_) <= clocks_[i].timeout_us) return false;
+  }
+  return true;
+}
+
+std::optional<int> ClockChoice::active_input() const {
+  if (active_ < 0) return std::nullopt;
+  return clocks_[static_cast<std::size_t>(active_)].input;
+}
+
+void ClockChoice::restore(const State& state) {
+  active_ = state.active;
+  utime_ = state.utime;
+  first_utime_ = state.first_utime;
+  newest_utime_ = state.newest_utime;
+  newest_utime_.resize(clocks_.size());
+  changed_ = false;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,51 @@
+/// Which channel drives a stage's time. The first of the list that is not silent; time-outs are in data time, so a
+/// silence shows only when another clock channel goes on.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stream/spec.h"
+
+namespace roadfix {
+
+class ClockChoice {
+ public:
+  explicit ClockChoice(std::vector<ClockSpec> clocks) : clocks_(std::move(clocks)), newest_utime_(clocks_.size()) {}
+
+  enum class Verdict {
+    kInput,   ///< not a clock now: an input like any other
+    kTick,    ///< the stage's time moves to it
+    kRefused  ///< older than the clock; it can no longer be taken in order
+  };
+
+  /// A sample of `input`. `changes` overrides the time-outs: a recorded ledger knows where the clock changed.
+  Verdict offer(int input, int64_t utime, std::optional<bool> changes = std::nullopt);
+
+  /// Whether the last kTick came from another channel than the tick before it (the first tick counts).
+  [[nodiscard]] bool changed() const { return changed_; }
+  [[nodiscard]] std::optional<int64_t> utime() const { return utime_; }
+  [[nodiscard]] std::optional<int> active_input() const;
+
+  struct State {
+    int active = -1;
+    std::optional<int64_t> utime;
+    std::optional<int64_t> first_utime;
+    std::vector<std::optional<int64_t>> newest_utime;
+  };
+  [[nodiscard]] State state() const { return {active_, utime_, first_utime_, newest_utime_}; }
+  void restore(const State& state);
+
+ private:
+  [[nodiscard]] bool may_take_over(int position, int64_t utime) const;
+
+  std::vector<ClockSpec> clocks_;
+  int active_ = -1;
+  bool changed_ = false;
+  std::optional<int64_t> utime_;
+  std::optional<int64_t> first_utime_;  // of any clock channel: until its time-out after it, the first clock may begin
+  std::vector<std::optional<int64_t>> newest_utime_;
+};
+
+}  // namespace roadfix

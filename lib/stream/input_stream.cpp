@@ -1,0 +1,186 @@
+#include "stream/input_stream.h"
+
+#include <algorithm>
+
+#include "stream/digest.h"
+
+namespace roadfix {
+
+namespace {
+
+/// What a silent clock may pile up before the oldest is given up.
+constexpr std::size_t kMaxWaiting = 50'000;
+constexpr std::size_t kMaxWaitingBytes = std::size_t{256} << 20;
+
+}  // namespace
+
+InputStream::InputStream(std::vector<InputSpec> inputs, std::vector<ClockSpec> clocks)
+    : inputs_(std::move(inputs)), clock_(std::move(clocks)), tracks_(inputs_.size()) {
+  for (const InputSpec& input : inputs_) lateness_us_ = std::max(lateness_us_, input.lateness_us);
+}
+
+Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> bytes) {
+  InputTrack& track = track_of(input);
+  ++track.counters.received;
+  track.newest_utime = std::max(track.newest_utime, id.utime);
+  if (precedent_ != nullptr && !precedent_->accepts(input, id)) return Offer::kExcluded;
+  if (resumes_at_ && id.utime <= *resumes_at_) {
+    const InputSpec& spec = inputs_[static_cast<std::size_t>(input)];
+    if (id.utime + spec.effect_delay_us <= *horizon_) return Offer::kExcluded;  // the state holds it
+    if (!waiting_.insert(id.utime + spec.effect_delay_us, input, id, bytes)) return Offer::kDuplicate;
+    return resumed_tick(input, id) ? Offer::kTick : Offer::kWaits;
+  }
+  switch (standing(input, id)) {
+    case Standing::kNew:
+      break;
+    case Standing::kDuplicate:
+      ++track.counters.duplicate;
+      return Offer::kDuplicate;
+    case Standing::kMissed:
+      return refuse(input, id, LedgerKind::kLate);
+    case Standing::kConflict:
+      ++track.counters.conflicts;
+      return refuse(input, id, LedgerKind::kRefused);
+  }
+  const InputSpec& spec = inputs_[static_cast<std::size_t>(input)];
+  const int64_t effect_utime = id.utime + spec.effect_delay_us;
+  if (horizon_ && effect_utime <= *horizon_) {
+    return refuse(input, id, spec.effect_delay_us > 0 ? LedgerKind::kUnusedFeedback : LedgerKind::kLate);
+  }
+  std::optional<bool> changes;
+  if (precedent_ != nullptr) changes = precedent_->changes_clock(input, id);
+  const ClockChoice::Verdict verdict = clock_.offer(input, id.utime, changes);
+  if (verdict == ClockChoice::Verdict::kRefused) return refuse(input, id, LedgerKind::kRefused);
+  if (!waiting_.insert(effect_utime, input, id, bytes)) {
+    ++track.counters.duplicate;
+    return Offer::kDuplicate;
+  }
+  if (verdict == ClockChoice::Verdict::kTick) {
+    tick(input, id);
+    return Offer::kTick;
+  }
+  limit_waiting();
+  return Offer::kWaits;
+}
+
+/// A message may come twice, may have been given up as lost, or may belong to a publisher that another has replaced.
+InputStream::Standing InputStream::standing(int input, const EventId& id) const {
+  const InputTrack& track = tracks_[static_cast<std::size_t>(input)];
+  if (!track.settled || id.run > track.settled->run) return Standing::kNew;
+  if (id.run < track.settled->run) {
+    // Stragglers of the run before still count until the horizon has passed them; a second publisher's ticks do not.
+    return clock_.active_input() == input && id.utime > *clock_.utime() ? Standing::kConflict : Standing::kNew;
+  }
+  if (id.seq > track.settled->seq) return Standing::kNew;
+  if (track.is_missing(id.seq)) return Standing::kMissed;
+  return id.utime > track.newest_settled_utime ? Standing::kConflict : Standing::kDuplicate;
+}
+
+Offer InputStream::refuse(int input, const EventId& id, LedgerKind kind) {
+  InputCounters& counters = track_of(input).counters;
+  if (kind == LedgerKind::kRefused) {
+    ++counters.refused;
+  } else {
+    ++counters.late;
+  }
+  ledger_.note(kind, input, id.run, id.seq, id.seq, id.utime);
+  return kind == LedgerKind::kRefused ? Offer::kRefused : Offer::kLate;
+}
+
+void InputStream::tick(int input, const EventId& id) {
+  if (clock_.changed()) ledger_.note(LedgerKind::kClockChanged, input, id.run, id.seq, id.seq, id.utime);
+  if (!run_) run_ = id.utime;
+  settle_tick(input, id);
+  ticks_ahead_.push_back({input, id});
+  horizon_ = std::max(horizon_.value_or(id.utime - lateness_us_), id.utime - lateness_us_);
+  while (!ticks_ahead_.empty() && ticks_ahead_.front().id.utime <= *horizon_) ticks_ahead_.pop_front();
+  resumes_at_.reset();
+}
+
+/// No older sample of the clock will be taken, so what is missing before this one and does not wait is lost.
+void InputStream::settle_tick(int input, const EventId& id) {
+  const InputTrack& track = tracks_[static_cast<std::size_t>(input)];
+  const bool same_run = track.settled && track.settled->run == id.run;
+  if (!same_run || id.seq > track.settled->seq + 1) {
+    for (const int64_t seq : waiting_.seqs(input, id.run, id.seq)) {
+      if (!same_run || seq > track.settled->seq) settle(input, {id.utime, id.run, seq});
+    }
+  }
+  settle(input, id);
+}
+
+/// Announces a new run, and what is missing between the last settled message and this one.
+void InputStream::settle(int input, const EventId& id) {
+  InputTrack& track = track_of(input);
+  if (!track.settled || id.run > track.settled->run) {
+    ledger_.note(LedgerKind::kRunBegan, input, id.run, id.seq, id.seq, id.utime);
+    track.begin_run(id.run, id.seq);
+  } else if (id.run == track.settled->run && id.seq > track.settled->seq) {
+    if (id.seq > track.settled->seq + 1) note_lost(input, id.run, track.settled->seq + 1, id.seq - 1);
+    track.settled->seq = id.seq;
+  }
+  track.newest_settled_utime = std::max(track.newest_settled_utime, id.utime);
+}
+
+void InputStream::note_lost(int input, int64_t run, int64_t first_seq, int64_t last_seq) {
+  InputTrack& track = track_of(input);
+  track.note_missing(first_seq, last_seq);
+  track.counters.lost += last_seq - first_seq + 1;
+  ledger_.note(LedgerKind::kLost, input, run, first_seq, last_seq, 0);
+}
+
+const WaitingInput* InputStream::next() {
+  waiting_.recycle(std::move(current_));
+  while (waiting_.front() != nullptr && horizon_ && waiting_.front()->effect_utime <= *horizon_) {
+    current_ = waiting_.pop();
+    if (admit(current_)) return &current_;
+    waiting_.recycle(std::move(current_));
+  }
+  current_ = {};
+  return nullptr;
+}
+
+/// Two runs at once, or a seq that does not rise with utime: what the order of the data itself contradicts.
+bool InputStream::admit(const WaitingInput& waiting) {
+  InputTrack& track = track_of(waiting.input);
+  const EventId& id = waiting.id;
+  if (track.applied &&
+      (id.run < track.applied->run || (id.run == track.applied->run && id.seq <= track.applied->seq))) {
+    ++track.counters.conflicts;
+    refuse(waiting.input, id, LedgerKind::kRefused);
+    return false;
+  }
+  settle(waiting.input, id);
+  const int64_t count = track.applied && track.applied->run == id.run ? track.applied->count + 1 : 1;
+  track.applied = InputTrack::Applied{id.run, id.seq, id.utime, count};
+  ++track.counters.applied;
+  digest_ = chain_digest(digest_ + static_cast<uint64_t>(waiting.input), waiting.bytes);
+  return true;
+}
+
+void InputStream::close_tick() { ledger_.enter(*clock_.utime()); }
+
+void InputStream::note_undecodable(int input, const std::optional<EventId>& id) {
+  ++track_of(input).counters.received;
+  ++track_of(input).counters.undecodable;
+  const EventId name = id.value_or(EventId{});
+  ledger_.note(LedgerKind::kUndecodable, input, name.run, name.seq, name.seq, name.utime);
+}
+
+void InputStream::note_skipped(int input, const EventId& id) {
+  ledger_.note(LedgerKind::kSkipped, input, id.run, id.seq, id.seq, id.utime);
+}
+
+void InputStream::limit_waiting() {
+  while (waiting_.size() > kMaxWaiting || waiting_.bytes() > kMaxWaitingBytes) {
+    WaitingInput oldest = waiting_.pop();
+    refuse(oldest.input, oldest.id, LedgerKind::kRefused);
+    waiting_.recycle(std::move(oldest));
+  }
+}
+
+int64_t InputStream::ledger_total() const {
+  return precedent_ != nullptr ? precedent_->entries_at(*clock_.utime()) : ledger_.total();
+}
+
+}  // namespace roadfix

@@ -1,0 +1,58 @@
+/// The exceptions to "every input was applied" (DESIGN.md, section 4). Inputs without an entry were taken.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+namespace roadfix {
+
+/// The values of ledger_entry_t::KIND_*.
+enum class LedgerKind : int8_t {
+  kLost = 0,
+  kLate = 1,
+  kUndecodable = 2,
+  kRefused = 3,
+  kSkipped = 4,
+  kClockChanged = 5,
+  kRunBegan = 6,
+  kUnusedFeedback = 7
+};
+
+struct LedgerEntry {
+  int64_t entry = 0;           ///< counts up from 1
+  int64_t at_clock_utime = 0;  ///< of the clock sample whose outputs are the first that count it
+  LedgerKind kind = LedgerKind::kLost;
+  int input = 0;
+  int64_t run = 0;
+  int64_t first_seq = 0;
+  int64_t last_seq = 0;
+  int64_t utime = 0;  ///< of first_seq where known
+};
+
+/// What happens between two clock samples is noted, and entered with the next: so the number of entries behind an
+/// output is a function of that output's utime.
+class Ledger {
+ public:
+  /// Joins onto the last note where it goes on from there.
+  void note(LedgerKind kind, int input, int64_t run, int64_t first_seq, int64_t last_seq, int64_t utime);
+
+  /// Gives the notes their numbers. Returns how many there were.
+  int64_t enter(int64_t clock_utime);
+
+  [[nodiscard]] int64_t total() const { return total_; }
+  void start_at(int64_t total) { total_ = total; }
+
+  /// Entered in the last 60 s of data time, at most kMaxRepeated, oldest first.
+  [[nodiscard]] const std::deque<LedgerEntry>& recent() const { return recent_; }
+
+  static constexpr int64_t kRepeat_us = 60'000'000;
+  static constexpr std::size_t kMaxRepeated = 1000;
+
+ private:
+  std::vector<LedgerEntry> notes_;
+  std::deque<LedgerEntry> recent_;
+  int64_t total_ = 0;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,29 @@
+/// What a stage declares about its inputs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace roadfix {
+
+struct InputSpec {
+  std::string channel;
+  std::string type;             ///< for example "imu_t"
+  int64_t lateness_us = 0;      ///< how far behind the clock it may arrive and still count
+  int64_t effect_delay_us = 0;  ///< feedback: applied at utime + this, and refused when it comes later than that
+};
+
+/// A channel that may drive the stage's time; the next in the list takes over where it is silent for its time-out.
+struct ClockSpec {
+  int input = 0;           ///< index into the inputs
+  int64_t timeout_us = 0;  ///< in data time
+};
+
+/// Names one message of a channel and says when it is valid.
+struct EventId {
+  int64_t utime = 0;
+  int64_t run = 0;  ///< names one start of the publisher
+  int64_t seq = 0;  ///< +1 per message of a run
+};
+
+}  // namespace roadfix

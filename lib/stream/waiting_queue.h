@@ -1,0 +1,46 @@
+/// Inputs that wait for the horizon, in the order (effect utime, rank, run, seq). Buffers are used again.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "stream/spec.h"
+
+namespace roadfix {
+
+struct WaitingInput {
+  int64_t effect_utime = 0;  ///< utime plus the input's effect delay
+  int input = 0;             ///< also its rank
+  EventId id;
+  std::vector<uint8_t> bytes;
+};
+
+class WaitingQueue {
+ public:
+  /// False, and nothing changes, where the same message waits already.
+  bool insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes);
+
+  [[nodiscard]] const WaitingInput* front() const { return queue_.empty() ? nullptr : &queue_.front(); }
+
+  /// Takes the front out; give it back with recycle().
+  WaitingInput pop();
+  void recycle(WaitingInput&& used);
+
+  /// The seqs below `before` of one channel's run that wait, rising.
+  [[nodiscard]] std::vector<int64_t> seqs(int input, int64_t run, int64_t before) const;
+
+  [[nodiscard]] std::size_t size() const { return queue_.size(); }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] std::size_t depth(int input) const;
+  [[nodiscard]] std::optional<int64_t> oldest_utime(int input) const;
+
+ private:
+  std::deque<WaitingInput> queue_;
+  std::vector<std::vector<uint8_t>> free_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,49 @@
+#include "roadfix/stages.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace roadfix {
+
+namespace {
+
+struct KnownStage {
+  std::string name;
+  std::unique_ptr<Stage> (*make)(const std::filesystem::path& vehicle_dir);
+};
+
+/// Each process adds its own line.
+const std::vector<KnownStage>& known_stages() {
+  static const std::vector<KnownStage> kStages = {};
+  return kStages;
+}
+
+}  // namespace
+
+std::vector<std::string> stage_names() {
+  std::vector<std::string> names;
+  for (const KnownStage& stage : known_stages()) names.push_back(stage.name);
+  return names;
+}
+
+std::vector<std::unique_ptr<Stage>> make_stages(const std::vector<std::string>& names,
+                                                const std::filesystem::path& vehicle_dir) {
+  std::string all;
+  for (const std::string& name : stage_names()) all += (all.empty() ? "" : ", ") + name;
+  for (const std::string& name : names) {
+    const std::vector<std::string> known = stage_names();
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw std::runtime_error("--stages: there is no stage '" + name + "' (there are " + all + ")");
+    }
+    if (std::count(names.begin(), names.end(), name) > 1) {
+      throw std::runtime_error("--stages: '" + name + "' stands there twice");
+    }
+  }
+  std::vector<std::unique_ptr<Stage>> stages;
+  for (const KnownStage& stage : known_stages()) {
+    if (std::find(names.begin(), names.end(), stage.name) != names.end()) stages.push_back(stage.make(vehicle_dir));
+  }
+  return stages;
+}
+
+}  // namespace roadfix

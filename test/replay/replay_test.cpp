@@ -1,0 +1,145 @@
+#include "bus/replay.h"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "support/chain_stage.h"
+#include "support/small_drive.h"
+#include "support/temporary_folder.h"
+
+using namespace roadfix;
+using namespace roadfix::test;
+
+namespace {
+
+std::string read_bytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<std::unique_ptr<Stage>> stages(const std::vector<StageSpec>& specs) {
+  std::vector<std::unique_ptr<Stage>> made;
+  for (const StageSpec& spec : specs) made.push_back(std::make_unique<ChainStage>(spec));
+  return made;
+}
+
+/// Channel and data of every event, in file order.
+std::vector<std::pair<std::string, std::string>> events(const std::filesystem::path& path, const std::string& prefix) {
+  LogReader reader(path);
+  std::vector<std::pair<std::string, std::string>> found;
+  while (const auto event = reader.next()) {
+    if (event->channel.starts_with(prefix)) {
+      found.emplace_back(event->channel, std::string(event->data.begin(), event->data.end()));
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+TEST_CASE("two replays are byte-identical, whatever the order of the input file") {
+  TemporaryFolder folder;
+  std::vector<DriveMessage> drive = small_drive(20.0);
+  write_drive(folder / "in.lcm", drive);
+  const std::vector<StageSpec> specs = {odometry_spec(), filter_spec(), fusion_spec()};
+  const ReplaySummary summary = replay(folder / "in.lcm", folder / "a.lcm", stages(specs));
+  replay(folder / "in.lcm", folder / "b.lcm", stages(specs));
+  std::mt19937 random(3);
+  std::shuffle(drive.begin(), drive.end(), random);
+  write_drive(folder / "shuffled.lcm", drive);
+  replay(folder / "shuffled.lcm", folder / "c.lcm", stages(specs));
+  const std::string a = read_bytes(folder / "a.lcm");
+  REQUIRE(a.size() > 100'000);
+  REQUIRE(a == read_bytes(folder / "b.lcm"));
+  REQUIRE(a == read_bytes(folder / "c.lcm"));
+  REQUIRE(events(folder / "a.lcm", "POSE_FUSED").size() == 2000);
+  for (const ReplaySummary::Input& input : summary.inputs) {
+    CAPTURE(input.stage, input.channel);
+    CHECK(input.counters.late + input.counters.lost + input.counters.refused + input.counters.duplicate == 0);
+  }
+
+  drive.pop_back();  // the comparison can fail
+  write_drive(folder / "fewer.lcm", drive);
+  replay(folder / "fewer.lcm", folder / "d.lcm", stages(specs));
+  REQUIRE(a != read_bytes(folder / "d.lcm"));
+}
+
+TEST_CASE("stage by stage gives what all stages at once give") {
+  TemporaryFolder folder;
+  write_drive(folder / "in.lcm", small_drive(20.0));
+  replay(folder / "in.lcm", folder / "all.lcm", stages({odometry_spec(), filter_spec(), fusion_spec()}));
+
+  ReplayOptions keep;
+  keep.copied_channels = {"IMU", "GNSS", "WHEELS", "POSE_WHEEL", "POSE_INS"};
+  replay(folder / "in.lcm", folder / "one.lcm", stages({odometry_spec()}), keep);
+  replay(folder / "one.lcm", folder / "two.lcm", stages({filter_spec()}), keep);
+  replay(folder / "two.lcm", folder / "three.lcm", stages({fusion_spec()}), keep);
+  const auto fused = events(folder / "all.lcm", "POSE_FUSED");
+  REQUIRE(fused.size() == 2000);
+  REQUIRE(fused == events(folder / "three.lcm", "POSE_FUSED"));
+  REQUIRE(events(folder / "all.lcm", "POSE_INS") == events(folder / "three.lcm", "POSE_INS"));
+}
+
+TEST_CASE("output events are in the order of utime, channel and seq, stamped with message time") {
+  TemporaryFolder folder;
+  write_drive(folder / "in.lcm", small_drive(5.0));
+  replay(folder / "in.lcm", folder / "out.lcm", stages({odometry_spec(), filter_spec(), fusion_spec()}));
+  LogReader reader(folder / "out.lcm");
+  std::tuple<int64_t, std::string, int64_t> last{0, "", -1};
+  int64_t eventnum = 0;
+  while (const auto event = reader.next()) {
+    const Header header = *read_header(event->data);
+    REQUIRE(event->timestamp_us == header.utime);
+    REQUIRE(event->eventnum == eventnum++);
+    const std::tuple<int64_t, std::string, int64_t> key{header.utime, std::string(event->channel), header.seq};
+    REQUIRE(last < key);
+    last = key;
+  }
+  REQUIRE(events(folder / "out.lcm", "REFERENCE").size() == 50);
+  REQUIRE(events(folder / "out.lcm", "CONFIG_DRIVE").size() == 1);
+  REQUIRE(events(folder / "out.lcm", "IMU").empty());
+}
+
+TEST_CASE("the stages' own channels in the input are computed again, not taken") {
+  TemporaryFolder folder;
+  std::vector<DriveMessage> drive = small_drive(5.0);
+  write_drive(folder / "in.lcm", drive);
+  replay(folder / "in.lcm", folder / "clean.lcm", stages({filter_spec(), fusion_spec()}));
+  drive.push_back(drive_message("POSE_INS", kDriveStart_us + 1'000'000, 7, pose_t{}));
+  write_drive(folder / "in2.lcm", drive);
+  replay(folder / "in2.lcm", folder / "out.lcm", stages({filter_spec(), fusion_spec()}));
+  REQUIRE(read_bytes(folder / "clean.lcm") == read_bytes(folder / "out.lcm"));
+}
+
+TEST_CASE("a log without the stage's clock, or over itself, is an error that leaves nothing") {
+  TemporaryFolder folder;
+  write_drive(folder / "in.lcm", small_drive(1.0));
+  using Catch::Contains;
+  REQUIRE_THROWS_WITH(replay(folder / "in.lcm", folder / "out.lcm", stages({fusion_spec()})),
+                      Contains("POSE_INS, POSE_WHEEL") && Contains("fusion"));
+  REQUIRE_THROWS_AS(replay(folder / "in.lcm", folder / "in.lcm", stages({filter_spec()})), std::runtime_error);
+  REQUIRE_THROWS_WITH(replay(folder / "absent.lcm", folder / "out.lcm", stages({filter_spec()})),
+                      Contains("absent.lcm"));
+  REQUIRE(std::distance(std::filesystem::directory_iterator(folder / ""), {}) == 1);
+}
+
+TEST_CASE("damaged bytes in the input are counted and the rest is replayed") {
+  TemporaryFolder folder;
+  std::vector<DriveMessage> drive = small_drive(5.0);
+  int damaged = 0;
+  for (DriveMessage& message : drive) {
+    if (message.channel == "GNSS" && message.header.seq == 7) {
+      message.bytes.pop_back();
+      ++damaged;
+    }
+  }
+  REQUIRE(damaged == 1);
+  write_drive(folder / "in.lcm", drive);
+  const ReplaySummary summary = replay(folder / "in.lcm", folder / "out.lcm", stages({filter_spec()}));
+  const InputCounters& gnss = summary.inputs.at(1).counters;
+  REQUIRE(gnss.undecodable == 1);
+  REQUIRE(gnss.lost == 1);
+  REQUIRE(events(folder / "out.lcm", "POSE_INS").size() == 500);
+}
