@@ -27,4 +27,18 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t max_by
   return text;
 }
 
+void write_text_file(const std::filesystem::path& path, const std::string& text) {
+  std::error_code error;
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
+  const std::filesystem::path partial = path.string() + ".part";
+  {
+    std::ofstream stream(partial, std::ios::binary);
+    stream << text;
+    stream.close();
+    if (!stream) throw ConfigError(path.string(), 0, "cannot be written");
+  }
+  std::filesystem::rename(partial, path, error);
+  if (error) throw ConfigError(path.string(), 0, "cannot be written: " + error.message());
+}
+
 }  // namespace roadfix

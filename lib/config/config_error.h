@@ -18,4 +18,7 @@ class ConfigError : public std::runtime_error {
 /// The whole file; ConfigError where it cannot be read or is longer than max_bytes.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{1} << 24U);
 
+/// Writes the whole file, its folders too, under its name only when it is complete; ConfigError where that fails.
+void write_text_file(const std::filesystem::path& path, const std::string& text);
+
 }  // namespace roadfix

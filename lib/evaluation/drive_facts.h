@@ -21,7 +21,7 @@
 namespace roadfix {
 
 /// The point of the vehicle that the reference's positions are of.
-enum class ReferenceOf { kImu, kRearAxle, kAntenna, kNone };
+enum class ReferenceOf { kImu, kRearAxle, kAntenna, kCamera, kNone };
 
 /// REFERENCE pose_t::reason of a fix that the estimators did not get.
 inline constexpr const char* kWithheld = "withheld";
@@ -61,6 +61,7 @@ void visit(ReferenceFacts& f, Visitor& v) {
            {{"imu", ReferenceOf::kImu},
             {"rear_axle", ReferenceOf::kRearAxle},
             {"antenna", ReferenceOf::kAntenna},
+            {"camera", ReferenceOf::kCamera},
             {"none", ReferenceOf::kNone}});
   v.boolean("attitude", f.attitude);
   v.boolean("velocity", f.velocity);

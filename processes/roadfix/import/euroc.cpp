@@ -1,0 +1,217 @@
+#include "roadfix/import/euroc.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "config/config.h"
+#include "geometry/so3.h"
+#include "roadfix/import/csv_reader.h"
+
+namespace roadfix {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kNanosecondsPerMicrosecond = 1000;
+constexpr const char* kTime = "#timestamp [ns]";
+
+/// OpenCV's matrix in YAML.
+struct OpencvMatrix {
+  int rows = 0;
+  int cols = 0;
+  Eigen::Matrix4d data = Eigen::Matrix4d::Identity();
+};
+
+template <class Visitor>
+void visit(OpencvMatrix& m, Visitor& v) {
+  v.integer("rows", m.rows, 4, 4);
+  v.integer("cols", m.cols, 4, 4);
+  v.require("data");
+  v.vector("data", m.data, -1e6, 1e6);
+}
+
+/// sensor.yaml of a camera or an IMU.
+struct SensorYaml {
+  std::string sensor_type;
+  std::string comment;
+  OpencvMatrix T_BS;
+  std::optional<double> rate_hz;
+  std::optional<Eigen::Vector2d> resolution;
+  std::optional<std::string> camera_model;
+  std::optional<Eigen::Vector4d> intrinsics;
+  std::optional<std::string> distortion_model;
+  std::vector<double> distortion_coefficients;
+  std::optional<double> gyroscope_noise_density;
+  std::optional<double> gyroscope_random_walk;
+  std::optional<double> accelerometer_noise_density;
+  std::optional<double> accelerometer_random_walk;
+};
+
+template <class Visitor>
+void visit(SensorYaml& c, Visitor& v) {
+  v.text("sensor_type", c.sensor_type);
+  v.text("comment", c.comment);
+  v.group("T_BS", c.T_BS);
+  v.optional_number("rate_hz", c.rate_hz, 0.01, 10000.0);
+  v.optional_vector("resolution", c.resolution, 1.0, 20000.0);
+  v.optional_text("camera_model", c.camera_model);
+  v.optional_vector("intrinsics", c.intrinsics, -20000.0, 20000.0);
+  v.optional_text("distortion_model", c.distortion_model);
+  v.numbers("distortion_coefficients", c.distortion_coefficients, -1000.0, 1000.0);
+  v.optional_number("gyroscope_noise_density", c.gyroscope_noise_density, 0.0, 1.0);
+  v.optional_number("gyroscope_random_walk", c.gyroscope_random_walk, 0.0, 1.0);
+  v.optional_number("accelerometer_noise_density", c.accelerometer_noise_density, 0.0, 10.0);
+  v.optional_number("accelerometer_random_walk", c.accelerometer_random_walk, 0.0, 10.0);
+}
+
+SensorYaml read_sensor_yaml(const fs::path& path) {
+  std::string text = read_text_file(path);
+  if (text.starts_with("%YAML:1.0")) text[0] = '#';  // OpenCV's directive, which YAML does not know
+  return parse_config<SensorYaml>(text, path.string());
+}
+
+SE3 pose_of(const OpencvMatrix& matrix, const fs::path& path) {
+  const Eigen::Matrix3d R = matrix.data.topLeftCorner<3, 3>();
+  constexpr double kTolerance = 1e-3;
+  if ((R * R.transpose() - Eigen::Matrix3d::Identity()).norm() > kTolerance || R.determinant() < 0.0) {
+    throw ConfigError(path.string(), 0, "T_BS.data: the 3x3 part is not a rotation");
+  }
+  return {normalized_positive(Eigen::Quaterniond(R)), matrix.data.topRightCorner<3, 1>()};
+}
+
+DistortionModel distortion_model(const SensorYaml& yaml, const fs::path& path) {
+  const std::string name = yaml.distortion_model.value_or("none");
+  if (name == "none") return DistortionModel::kNone;
+  if (name == "radial-tangential") return DistortionModel::kRadtan;
+  if (name == "equidistant") return DistortionModel::kEquidistant;
+  throw ConfigError(path.string(), 0,
+                    fmt::format("distortion_model = {}: must be none, radial-tangential or equidistant", name));
+}
+
+CameraCalibration read_camera(const fs::path& path) {
+  const SensorYaml yaml = read_sensor_yaml(path);
+  if (yaml.camera_model.value_or("pinhole") != "pinhole") {
+    throw ConfigError(path.string(), 0, fmt::format("camera_model = {}: must be pinhole", *yaml.camera_model));
+  }
+  CameraCalibration camera;
+  camera.rate = yaml.rate_hz;
+  if (yaml.resolution) {
+    camera.width_px = static_cast<int>(yaml.resolution->x());
+    camera.height_px = static_cast<int>(yaml.resolution->y());
+  }
+  camera.distortion = CameraDistortion{distortion_model(yaml, path), yaml.distortion_coefficients};
+  camera.model =
+      camera.distortion->model == DistortionModel::kEquidistant ? CameraModel::kFisheye : CameraModel::kPinhole;
+  camera.intrinsics_px = yaml.intrinsics;
+  camera.colour = CameraColour::kGray;
+  const SE3 T_body_camera = pose_of(yaml.T_BS, path);
+  const Eigen::Quaterniond& q = T_body_camera.q;
+  camera.mounting = CameraMounting{T_body_camera.p, {q.w(), q.x(), q.y(), q.z()}, std::nullopt, std::nullopt};
+  return camera;
+}
+
+std::vector<FrameFile> read_frames(const fs::path& folder) {
+  CsvReader csv(folder / "data.csv", {{kTime, "filename"}});
+  std::vector<FrameFile> frames;
+  while (csv.next()) {
+    const fs::path picture = folder / "data" / std::string(csv.text(1));
+    std::error_code ignored;
+    if (!fs::is_regular_file(picture, ignored)) csv.fail(csv.index("filename"), "no such file in data/");
+    frames.push_back({csv.utime(csv.index(kTime), kNanosecondsPerMicrosecond), picture});
+  }
+  return frames;
+}
+
+Eigen::Vector3d vector3(const CsvReader& csv, const std::string& prefix, const std::string& unit, double bound) {
+  Eigen::Vector3d v;
+  const char* axes = "xyz";
+  for (int i = 0; i < 3; ++i)
+    v[i] = csv.number(csv.index(fmt::format("{}_{} [{}]", prefix, axes[i], unit)), -bound, bound);
+  return v;
+}
+
+std::vector<std::string> columns3(const std::string& prefix, const std::string& unit) {
+  return {fmt::format("{}_x [{}]", prefix, unit), fmt::format("{}_y [{}]", prefix, unit),
+          fmt::format("{}_z [{}]", prefix, unit)};
+}
+
+std::vector<std::string> joined(const std::vector<std::vector<std::string>>& parts) {
+  std::vector<std::string> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+std::vector<ImuSample> read_imu(const fs::path& path) {
+  CsvReader csv(path, {joined({{kTime}, columns3("w_RS_S", "rad s^-1"), columns3("a_RS_S", "m s^-2")})});
+  std::vector<ImuSample> samples;
+  samples.reserve(csv.expected_rows());
+  while (csv.next()) {
+    samples.push_back({csv.utime(csv.index(kTime), kNanosecondsPerMicrosecond),
+                       vector3(csv, "w_RS_S", "rad s^-1", 100.0), vector3(csv, "a_RS_S", "m s^-2", 1000.0)});
+  }
+  return samples;
+}
+
+std::vector<LocalPose> read_groundtruth(const fs::path& path) {
+  constexpr const char* kShortTime = "#timestamp";
+  CsvReader csv(path,
+                {joined({{kShortTime}, columns3("p_RS_R", "m"), {"q_RS_w []", "q_RS_x []", "q_RS_y []", "q_RS_z []"}}),
+                 {columns3("v_RS_R", "m s^-1"), columns3("b_w_RS_S", "rad s^-1"), columns3("b_a_RS_S", "m s^-2")}});
+  const bool has_velocity = csv.has("v_RS_R_x [m s^-1]");
+  std::vector<LocalPose> poses;
+  while (csv.next()) {
+    LocalPose pose;
+    pose.t_us = csv.utime(csv.index(kShortTime), kNanosecondsPerMicrosecond);
+    const auto part = [&](const char* column) { return csv.number(csv.index(column), -1.001, 1.001); };
+    const Eigen::Quaterniond q(part("q_RS_w []"), part("q_RS_x []"), part("q_RS_y []"), part("q_RS_z []"));
+    if (std::abs(q.norm() - 1.0) > 1e-3) csv.fail(csv.index("q_RS_w []"), "the quaternion must have unit norm");
+    pose.T_local_body = {normalized_positive(q), vector3(csv, "p_RS_R", "m", 1e6)};
+    if (has_velocity) pose.velocity_local = vector3(csv, "v_RS_R", "m s^-1", 1000.0);
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+ImuCalibration imu_calibration(const SensorYaml& yaml) {
+  ImuCalibration imu;
+  imu.rate = yaml.rate_hz;
+  imu.gyro_noise = yaml.gyroscope_noise_density;
+  imu.accel_noise = yaml.accelerometer_noise_density;
+  return imu;  // the random walks say how biases move, not how large they are: those stay unknown
+}
+
+}  // namespace
+
+Drive read_euroc(const fs::path& folder) {
+  std::error_code ignored;
+  const bool is_above = fs::is_directory(folder / "mav0", ignored);
+  const fs::path mav = is_above ? folder / "mav0" : folder;
+  Drive drive;
+  drive.format = "euroc";
+  const fs::path named = fs::weakly_canonical(is_above ? folder : folder / "..");
+  drive.description.name = named.filename().string();
+  drive.description.origin = "EuRoC MAV recording";
+  Calibration& calibration = drive.description.calibration;
+  calibration.body_origin = BodyOrigin::kImu;
+  calibration.mounting = MountingCalibration{Eigen::Vector3d::Constant(180.0)};
+  drive.imu = read_imu(mav / "imu0" / "data.csv");
+  calibration.sensors.imu = imu_calibration(read_sensor_yaml(mav / "imu0" / "sensor.yaml"));
+  if (fs::exists(mav / "cam0", ignored)) {
+    drive.frames_left = read_frames(mav / "cam0");
+    calibration.sensors.camera_left = read_camera(mav / "cam0" / "sensor.yaml");
+  }
+  if (fs::exists(mav / "cam1", ignored)) {
+    drive.frames_right = read_frames(mav / "cam1");
+    calibration.sensors.camera_right = read_camera(mav / "cam1" / "sensor.yaml");
+  }
+  const fs::path truth = mav / "state_groundtruth_estimate0";
+  if (fs::exists(truth, ignored)) {
+    drive.local_reference = read_groundtruth(truth / "data.csv");
+    constexpr double kMotionCapture = 0.001;  // m, Burri et al. 2016, section 3.2: below a millimetre
+    drive.description.reference = {ReferenceOf::kImu, true, kMotionCapture};
+  }
+  return drive;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,58 @@
+#include "roadfix/import/image_header.h"
+
+#include <algorithm>
+#include <array>
+
+namespace roadfix {
+namespace {
+
+std::size_t big_endian(std::span<const uint8_t> bytes, std::size_t at, std::size_t count) {
+  std::size_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) value = (value << 8U) | bytes[at + i];
+  return value;
+}
+
+/// PNG specification, section 5.2 and 11.2.2: signature, then IHDR with width and height.
+std::optional<ImageHeader> png_header(std::span<const uint8_t> bytes) {
+  if (bytes.size() < 24) return std::nullopt;
+  return ImageHeader{ImageHeader::Kind::kPng, static_cast<int>(big_endian(bytes, 16, 4)),
+                     static_cast<int>(big_endian(bytes, 20, 4))};
+}
+
+/// ITU-T T.81, annex B: marker segments up to the frame header SOFn (0xC0 to 0xCF without DHT, JPG and DAC).
+std::optional<ImageHeader> jpeg_header(std::span<const uint8_t> bytes) {
+  std::size_t at = 2;
+  while (at + 9 < bytes.size()) {
+    if (bytes[at] != 0xFF) return std::nullopt;
+    const unsigned marker = bytes[at + 1];
+    if (marker == 0xFF) {  // fill byte
+      ++at;
+      continue;
+    }
+    const bool is_frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+    if (is_frame) {
+      return ImageHeader{ImageHeader::Kind::kJpeg, static_cast<int>(big_endian(bytes, at + 7, 2)),
+                         static_cast<int>(big_endian(bytes, at + 5, 2))};
+    }
+    at += 2 + big_endian(bytes, at + 2, 2);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<ImageHeader> read_image_header(std::span<const uint8_t> bytes) {
+  constexpr std::array<uint8_t, 8> kPngSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  constexpr int kMaxPixels = 65535;
+  std::optional<ImageHeader> header;
+  if (bytes.size() > kPngSignature.size() && std::equal(kPngSignature.begin(), kPngSignature.end(), bytes.begin())) {
+    header = png_header(bytes);
+  } else if (bytes.size() > 2 && bytes[0] == 0xFF && bytes[1] == 0xD8) {
+    header = jpeg_header(bytes);
+  }
+  const auto sane = [](int pixels) { return pixels > 0 && pixels <= kMaxPixels; };
+  if (header && !(sane(header->width_px) && sane(header->height_px))) return std::nullopt;
+  return header;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,20 @@
+/// Size and kind of a packed picture from its first bytes, without decoding it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace roadfix {
+
+struct ImageHeader {
+  enum class Kind { kJpeg, kPng };
+  Kind kind = Kind::kJpeg;
+  int width_px = 0;
+  int height_px = 0;
+};
+
+/// Nothing where the bytes are neither JPEG nor PNG, or end before the size is told.
+std::optional<ImageHeader> read_image_header(std::span<const uint8_t> bytes);
+
+}  // namespace roadfix

@@ -1,0 +1,124 @@
+// roadfix import: other people's recordings as a drive log and a vehicle configuration.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "roadfix/commands.h"
+#include "roadfix/import/drive_log.h"
+#include "roadfix/import/source.h"
+
+namespace roadfix {
+namespace {
+
+struct Options {
+  std::filesystem::path source;
+  std::filesystem::path out;
+  std::filesystem::path vehicle;
+  bool overwrite = false;
+  bool progress = false;
+  SourceOptions read;
+  ImportChanges changes;
+  CutGnss cut;
+  GnssSpike spike;
+  GnssBias bias;
+  double score_skip = 0.0;
+  std::filesystem::path times;
+  std::filesystem::path reference;
+};
+
+void print_progress(std::size_t done, std::size_t all) {
+  std::cerr << fmt::format("\r{} of {} messages ({} %)", done, all, all == 0 ? 100 : 100 * done / all);
+  if (done == all) std::cerr << "\n";
+}
+
+/// What was asked for, from the flags that were given.
+void collect(const CLI::App& command, Options& options) {
+  GnssChanges& gnss = options.changes.gnss;
+  if (command.count("--cut-gnss") > 0) gnss.cut = options.cut;
+  if (command.count("--gnss-spike") > 0) gnss.spike = options.spike;
+  if (command.count("--gnss-bias-after-outage") > 0) gnss.bias_after_outage = options.bias;
+  if (command.count("--score-skip") > 0) options.changes.score_skip = options.score_skip;
+  if (command.count("--times") > 0) options.read.times = options.times;
+  if (command.count("--reference") > 0) options.read.reference = options.reference;
+}
+
+void run(Options& options) {
+  if (options.read.format.empty()) {
+    options.read.format = detect_format(options.source);
+    std::cout << options.source.string() << ": format " << options.read.format << "\n";
+  }
+  Drive drive = read_source(options.source, options.read);
+  const std::string name = drive.description.name;
+  if (!options.vehicle.empty()) {
+    write_vehicle(drive.description.calibration, name, options.vehicle, options.overwrite);
+  }
+  const bool shows = options.progress || isatty(STDERR_FILENO) == 1;
+  const DriveLogSummary summary =
+      write_drive_log(std::move(drive), options.changes, options.out, shows ? Progress(print_progress) : Progress());
+  std::cout << options.out.string() << ": " << name << "\n" << summary.text;
+  for (const Outage& outage : summary.facts.outages) {
+    std::cout << fmt::format("  GNSS cut from {} to {}, {:.2f} s after the first fix\n", outage.first_withheld_us,
+                             outage.last_withheld_us,
+                             seconds_between(summary.facts.first_fix_us, outage.first_withheld_us));
+  }
+  if (!options.vehicle.empty()) std::cout << "vehicle: " << options.vehicle.string() << "\n";
+}
+
+void add_gnss_flags(CLI::App& command, Options& options) {
+  const auto positive = CLI::PositiveNumber;
+  auto* cut =
+      command.add_option("--cut-gnss", options.cut.length, "withhold all fixes for so long, s")->check(positive);
+  auto* every =
+      command.add_option("--every", options.cut.every, "from one cut's start to the next, s")->check(positive);
+  command.add_option("--after", options.cut.after, "first cut, s after the first fix")->needs(cut);
+  command.add_option("--phase", options.cut.phase, "added to --after, s")->needs(cut);
+  cut->needs(every);
+  every->needs(cut);
+  auto* spike = command.add_option("--gnss-spike", options.spike.moved, "move single fixes by so much, m");
+  auto* every_fix =
+      command.add_option("--every-fix", options.spike.every_fix, "move every so-manyth fix")->needs(spike);
+  spike->needs(every_fix);
+  auto* bias =
+      command.add_option("--gnss-bias-after-outage", options.bias.moved, "move the first fixes after each cut, m");
+  bias->needs(cut);
+  command.add_option("--fixes", options.bias.fixes, "how many of them")->needs(bias)->check(positive);
+  command.add_option("--azimuth-seed", options.changes.gnss.azimuth_seed, "directions of moved fixes")
+      ->capture_default_str();
+  command.add_option("--gnss-every", options.changes.gnss.keep_every, "keep one fix in so many")
+      ->check(positive)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_import_command(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("import", "Make a drive log and a vehicle configuration from a recording");
+  command->add_option("source", options->source, "a folder, or a file of poses")->required();
+  command->add_option("--out", options->out, "the log to write")->required();
+  command->add_option("--vehicle", options->vehicle, "folder for calibration.yaml");
+  command->add_option("--format", options->read.format, "folder, kitti, euroc or poses (default: what it looks like)")
+      ->check(CLI::IsMember(source_formats()));
+  command->add_option("--without", options->changes.without, "sensors to leave out, with commas between")
+      ->delimiter(',')
+      ->check(CLI::IsMember(sensor_names()));
+  command->add_option("--start-after", options->changes.start_after, "leave out the start, s after the first fix")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--score-skip", options->score_skip, "do not score so many seconds at the start")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--sequence", options->read.sequence, "poses: which one of the folder's sequences");
+  command->add_option("--times", options->times, "poses: file of frame times");
+  command->add_option("--reference", options->reference, "poses: file of true poses");
+  command->add_flag("--overwrite", options->overwrite, "replace a calibration.yaml that differs");
+  command->add_flag("--progress", options->progress, "show progress even where no terminal is");
+  add_gnss_flags(*command, *options);
+  command->callback([command, options] {
+    collect(*command, *options);
+    run(*options);
+  });
+}
+
+}  // namespace roadfix
