@@ -1,0 +1,28 @@
+#include "wheel/direction.h"
+
+#include "samples/samples.h"
+
+namespace roadfix {
+
+void add_magnitude(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude, double predicted,
+                   double variance) {
+  // log N(m - v) - log N(m + v) = 2 m v / S
+  const double evidence = 2.0 * magnitude * predicted / variance;
+  if (d.sign != 0) {
+    if (magnitude < kReversible && d.sign * evidence < -limits.evidence) d = {evidence > 0.0 ? 1 : -1, false, {}};
+    return;
+  }
+  if (evidence > limits.evidence) {
+    d = {1, false, {}};
+  } else if (evidence < -limits.evidence) {
+    d = {-1, false, {}};
+  } else if (!d.undecided_since_us) {
+    d.undecided_since_us = t_us;
+  } else if (seconds_between(*d.undecided_since_us, t_us) > limits.timeout) {
+    d = {1, true, {}};
+  }
+}
+
+void forget_direction(DirectionState& d) { d = {}; }
+
+}  // namespace roadfix

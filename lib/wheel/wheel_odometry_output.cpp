@@ -1,0 +1,126 @@
+// What the wheel odometry tells: pose, report, snapshot (MODEL.md, section 10).
+#include <cmath>
+
+#include "geometry/euler.h"
+#include "wheel/wheel_odometry.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kLostSpeedSigma = 3.0;  ///< m/s: the speed is no longer known
+constexpr double kLostYawSigma = 0.8;    ///< rad: neither is the direction
+
+/// Rotation error in vehicle axes by (roll, pitch, yaw) errors: the inverse of the Euler rates' matrix (M.28).
+Eigen::Matrix3d rotation_by_angles(const Tilt& tilt) { return euler_rates_by_omega(tilt).inverse(); }
+
+}  // namespace
+
+Odometry WheelOdometry::odometry() const {
+  Odometry out;
+  out.t_us = t_us_;
+  if (!started_) return out;
+  const WheelVector& x = state_.x;
+  const WheelCovariance& P = state_.P;
+  out.T_frame_vehicle.p = x.segment<3>(kPos);
+  out.T_frame_vehicle.q = quaternion({x(kYaw), x(kPitch), x(kRoll)});
+  out.velocity = Eigen::Vector3d(x(kSpeed), 0.0, 0.0);
+  if (!standing_.standing) {
+    out.angular_rate = gyro_;
+    if (!gyro_yaw_) out.angular_rate.z() = wheel_yaw_rate_.value_or(0.0);
+    out.angular_rate -= x.segment<3>(kGyroBias);
+  }
+
+  Eigen::Matrix<double, 6, kWheelStates> J = Eigen::Matrix<double, 6, kWheelStates>::Zero();
+  J.block<3, 3>(0, kPos).setIdentity();
+  const Eigen::Matrix3d by_angles = rotation_by_angles(state_.tilt());
+  J.block<3, 1>(3, kRoll) = by_angles.col(0);
+  J.block<3, 1>(3, kPitch) = by_angles.col(1);
+  J.block<3, 1>(3, kYaw) = by_angles.col(2);
+  out.cov_pose = J * P * J.transpose();
+
+  const double v = x(kSpeed), t = config_.tuning.align_time;
+  const double side = config_.tuning.side_noise, climb = config_.tuning.climb_noise;
+  out.cov_velocity.diagonal() << P(kSpeed, kSpeed), v * v * (P(kSide, kSide) + side * side / t) + P(kSpeed, kSpeed),
+      v * v * (P(kClimb, kClimb) + climb * climb / t) + P(kSpeed, kSpeed);
+  out.validity = report().validity;
+  return out;
+}
+
+WheelReport WheelOdometry::report() const {
+  WheelReport r;
+  r.reset_counter = reset_counter_;
+  r.standing = standing_.standing;
+  r.slipping = slip_since_us_.has_value();
+  if (!started_) {
+    r.phase = wheels_us_ && imu_us_ ? WheelPhase::kAligning : WheelPhase::kWaiting;
+    r.reason = !wheels_us_ ? "waits for wheels" : (!imu_us_ ? "waits for imu" : "levels by the accelerometer");
+    return r;
+  }
+  const auto weak = [&](const char* reason) {
+    r.phase = WheelPhase::kWeak;
+    r.validity = Validity::kCoasting;
+    r.reason = reason;
+  };
+  const bool imu_silent = !imu_us_ || seconds_between(*imu_us_, t_us_) > config_.tuning.imu_timeout;
+  r.phase = WheelPhase::kRunning;
+  r.validity = Validity::kValid;
+  if (imu_silent && yaw_known_) weak("no imu: level road assumed, yaw rate from the wheels");
+  if (direction_.assumed) weak("direction unknown, forward assumed");
+  if (direction_.undecided_since_us) weak("direction unknown");
+  if (r.slipping) weak("wheels slip: speed from the accelerometer");
+  if (seconds_between(*wheels_us_, t_us_) > config_.tuning.wheel_timeout)
+    weak("no wheels: speed from the accelerometer");
+  if (!yaw_known_) weak("no yaw rate: neither imu nor wheels tell it");
+  if (state_.sigma(kSpeed) > kLostSpeedSigma || state_.sigma(kYaw) > kLostYawSigma) {
+    r.phase = WheelPhase::kLost;
+    r.validity = Validity::kInvalid;
+    r.reason += r.reason.empty() ? "uncertainty too large" : "; uncertainty too large";
+  }
+  return r;
+}
+
+template <class Self, class Visitor>
+void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
+  visit(self.state_.x, self.state_.P, self.started_, self.t_us_, self.imu_us_, self.wheels_us_, self.first_us_);
+  visit(self.last_speed_, self.forward_acceleration_, self.wheel_yaw_rate_, self.gyro_);
+  visit(self.gyro_yaw_, self.yaw_known_, self.slip_since_us_);
+  visit(self.standing_.quiet_since_us, self.standing_.slow_gyro, self.standing_.quiet_gyro, self.standing_.standing);
+  visit(self.direction_.sign, self.direction_.assumed, self.direction_.undecided_since_us);
+  visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_);
+  visit(self.align_force_, self.align_time_, self.block_gyro_, self.block_time_);
+  visit(self.mag_us_, self.mag_strength_, self.mag_dip_, self.reset_counter_);
+}
+
+namespace {
+
+template <class T>
+void write(StateWriter& w, const T& value) {
+  w.put(value);
+}
+template <class T>
+void write(StateWriter& w, const std::optional<T>& value) {
+  w.put(value.has_value());
+  w.put(value.value_or(T{}));
+}
+template <class T>
+void read(StateReader& r, T& value) {
+  r.get(value);
+}
+template <class T>
+void read(StateReader& r, std::optional<T>& value) {
+  const bool has = r.get<bool>();
+  value = r.get<T>();
+  if (!has) value.reset();
+}
+
+}  // namespace
+
+void WheelOdometry::save(StateWriter& writer) const {
+  visit_members(*this, [&](const auto&... members) { (write(writer, members), ...); });
+}
+
+void WheelOdometry::load(StateReader& reader) {
+  visit_members(*this, [&](auto&... members) { (read(reader, members), ...); });
+}
+
+}  // namespace roadfix

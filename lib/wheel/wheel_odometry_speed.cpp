@@ -1,0 +1,145 @@
+// What the wheels do to the state: speed, slip, direction, standing (MODEL.md, sections 6 to 8).
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/so3.h"
+#include "wheel/wheel_kinematics.h"
+#include "wheel/wheel_odometry.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kStandingSpeedSigma = 1e-3;    ///< m/s
+constexpr double kUnknownTilt = 3.0 * kDegree;  ///< roads' cross fall and slopes, where no accelerometer tells
+constexpr double kStartMoved = 0.02;            ///< m, that a start may go unseen below the wheels' threshold
+
+bool usable(const WheelSample& wheels) {
+  constexpr double kLargestSpeed = 150.0, kLargestRate = 35.0;  // m/s, rad/s: beyond any car
+  if (wheels.num_speeds != 1 && wheels.num_speeds != 4) return false;
+  for (int i = 0; i < wheels.num_speeds; ++i)
+    if (!(std::abs(wheels.speeds[static_cast<std::size_t>(i)]) < kLargestSpeed)) return false;
+  return !wheels.yaw_rate || std::abs(*wheels.yaw_rate) < kLargestRate;
+}
+
+}  // namespace
+
+WheelInputStatus WheelOdometry::add(const WheelSample& wheels) {
+  if (!usable(wheels)) return WheelInputStatus::kBadValue;
+  if (wheels_us_ && wheels.t_us <= *wheels_us_) return WheelInputStatus::kOld;
+  if (!first_us_) first_us_ = wheels.t_us;
+  const WheelMotion motion = wheel_motion(wheels, config_.sensors.track_width, config_.tuning.side_rule);
+  const bool magnitude_only = wheels.direction == WheelDirection::kUnknown;
+  const std::optional<int64_t> last_us = wheels_us_;
+  wheels_us_ = wheels.t_us;
+  wheel_yaw_rate_ = chosen_yaw_rate(motion);
+
+  const bool imu_silent = seconds_between(imu_us_.value_or(*first_us_), wheels.t_us) > config_.tuning.imu_timeout;
+  if (!started_) {
+    if (magnitude_only && !direction_.undecided_since_us) direction_.undecided_since_us = wheels.t_us;
+    const double rate = wheel_speed_rate(last_us, wheels.t_us, motion.speed);
+    last_speed_ = motion.speed;
+    if (imu_silent) {
+      t_us_ = wheels.t_us;
+      start({0.0, 0.0}, kUnknownTilt);
+    } else if (last_us) {
+      align_by_plumb(rate);
+    } else {
+      forget_plumb();
+    }
+    return started_ ? WheelInputStatus::kUsed : WheelInputStatus::kAligning;
+  }
+  const double sign = magnitude_only && direction_.sign < 0 ? -1.0 : 1.0;
+  if (imu_silent && wheels.t_us > t_us_) {
+    const double gained = magnitude_only && direction_.sign == 0 ? 0.0 : sign * motion.speed - state_.x(kSpeed);
+    step_blind(wheels.t_us, gained / seconds_between(t_us_, wheels.t_us));
+  }
+  const WheelInputStatus status = fuse_speed(wheels.t_us, motion.speed, magnitude_only);
+  const double rate = wheel_speed_rate(last_us, wheels.t_us, sign * motion.speed);
+  last_speed_ = sign * motion.speed;
+  if (config_.tuning.correct_acceleration) level_by_plumb(rate);
+  watch_standing(wheels.t_us, motion.speed, status != WheelInputStatus::kSlip);
+  return status;
+}
+
+std::optional<double> WheelOdometry::chosen_yaw_rate(const WheelMotion& motion) const {
+  switch (config_.tuning.yaw_source) {
+    case YawSource::kVehicleSensor:
+      return motion.sensor_yaw_rate;
+    case YawSource::kWheelSides:
+      return motion.sides_yaw_rate;
+    case YawSource::kAutomatic:
+      return motion.sensor_yaw_rate ? motion.sensor_yaw_rate : motion.sides_yaw_rate;
+    case YawSource::kGyro:
+      break;
+  }
+  return std::nullopt;
+}
+
+/// The wheels' acceleration over the interval between two samples.
+double WheelOdometry::wheel_speed_rate(std::optional<int64_t> last_us, int64_t t_us, double speed) const {
+  return last_us ? (speed - last_speed_) / seconds_between(*last_us, t_us) : 0.0;
+}
+
+WheelVector WheelOdometry::speed_row() const {
+  const double scale = 1.0 + state_.x(kWheelScale);
+  WheelVector H = WheelVector::Zero();
+  H(kSpeed) = 1.0 / scale;
+  H(kWheelScale) = -state_.x(kSpeed) / (scale * scale);
+  return H;
+}
+
+/// Of the wheels at t_us, from the state a little before (M.27).
+double WheelOdometry::predicted_speed(int64_t t_us) const {
+  return (state_.x(kSpeed) + forward_acceleration_ * seconds_between(t_us_, t_us)) / (1.0 + state_.x(kWheelScale));
+}
+
+/// A magnitude with the sign that the accelerometer supports; nothing while that is open.
+std::optional<double> WheelOdometry::with_sign(int64_t t_us, double magnitude, double predicted, double variance) {
+  const WheelTuning& t = config_.tuning;
+  if (magnitude < t.standing_speed) return std::clamp(predicted, -magnitude, magnitude);
+  add_magnitude(direction_, {t.direction_evidence, t.direction_timeout}, t_us, magnitude, predicted, variance);
+  if (direction_.sign == 0) return std::nullopt;
+  return direction_.sign * magnitude;
+}
+
+WheelInputStatus WheelOdometry::fuse_speed(int64_t t_us, double speed, bool magnitude_only) {
+  const double noise = config_.sensors.wheel_noise * config_.sensors.wheel_noise;
+  const WheelVector H = speed_row();
+  const double predicted = predicted_speed(t_us);
+  const double S = H.dot(state_.P * H) + noise;
+  if (magnitude_only) {
+    const std::optional<double> signed_speed = with_sign(t_us, speed, predicted, S);
+    if (!signed_speed) return WheelInputStatus::kNoDirection;
+    speed = *signed_speed;
+  } else {
+    direction_ = DirectionState{};
+  }
+  const double innovation = speed - predicted;
+  if (innovation * innovation > config_.tuning.slip_gate * config_.tuning.slip_gate * S) {
+    if (!slip_since_us_) slip_since_us_ = t_us;
+    if (seconds_between(*slip_since_us_, t_us) < config_.tuning.slip_timeout) return WheelInputStatus::kSlip;
+    state_.P(kSpeed, kSpeed) += innovation * innovation;  // it lasts too long to be slip: the wheels are right again
+  }
+  slip_since_us_.reset();
+  schmidt_update(state_, H, innovation, noise, {kSpeed});
+  return WheelInputStatus::kUsed;
+}
+
+void WheelOdometry::watch_standing(int64_t t_us, double speed, bool trusted) {
+  const WheelTuning& t = config_.tuning;
+  const bool stood = standing_.standing;
+  add_speed(standing_, {t.standing_speed, t.standing_rate, t.standing_after}, t_us, speed, trusted);
+  if (standing_.standing && !stood) {
+    state_.x(kSpeed) = 0.0;
+    decouple(state_.P, kSpeed, kStandingSpeedSigma);
+    direction_ = DirectionState{};
+    block_gyro_.setZero();
+    block_time_ = 0.0;
+  }
+  if (stood && !standing_.standing) {
+    decouple(state_.P, kSpeed, t.standing_speed);
+    state_.P.block<2, 2>(kPos, kPos) += kStartMoved * kStartMoved * Eigen::Matrix2d::Identity();
+  }
+}
+
+}  // namespace roadfix

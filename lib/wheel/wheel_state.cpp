@@ -1,0 +1,29 @@
+#include "wheel/wheel_state.h"
+
+#include <cmath>
+
+#include "geometry/so3.h"
+
+namespace roadfix {
+
+double WheelState::sigma(int index) const { return std::sqrt(P(index, index)); }
+
+void decouple(WheelCovariance& P, int index, double sigma) {
+  P.row(index).setZero();
+  P.col(index).setZero();
+  P(index, index) = sigma * sigma;
+}
+
+void schmidt_update(WheelState& state, const WheelVector& H, double innovation, double variance,
+                    std::initializer_list<int> corrected) {
+  const WheelVector PH = state.P * H;
+  const double S = H.dot(PH) + variance;
+  WheelVector K = WheelVector::Zero();
+  for (const int i : corrected) K(i) = PH(i) / S;
+  state.x += K * innovation;
+  for (const int i : {int{kYaw}, int{kRoll}, int{kMagOffset}}) state.x(i) = wrap_angle(state.x(i));
+  // Joseph: (I - K H') P (I - K H')' + K R K' = P - K PH' - PH K' + S K K'
+  state.P += S * K * K.transpose() - K * PH.transpose() - PH * K.transpose();
+}
+
+}  // namespace roadfix

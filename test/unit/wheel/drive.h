@@ -1,0 +1,45 @@
+/// Runs the wheel odometry over simulated drives, and compares with the truth in the odometry's own level frame.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "simulation/simulate.h"
+#include "wheel/wheel_odometry.h"
+
+namespace roadfix::test {
+
+/// The filter's knowledge of the simulated sensors: exactly the simulation's own figures.
+WheelConfig matching_config(const ScenarioConfig& scenario);
+
+/// Called after each imu sample (without imu: wheel sample) once the odometry has started.
+using OnPose = std::function<void(const WheelOdometry&)>;
+
+/// Feeds imu, wheels and mag in the order of their times.
+void run(const SimulatedDrive& drive, WheelOdometry& odometry, const OnPose& on_pose);
+
+/// Truth seen from the level frame of the odometry's first pose.
+class LevelTruth {
+ public:
+  explicit LevelTruth(const SimulatedDrive& drive) : drive_(drive) {}
+  /// Call with the first pose's time.
+  void start(int64_t t_us);
+  [[nodiscard]] bool started() const { return T_level_enu_.has_value(); }
+  /// The error d with retract(estimate, d) == truth.
+  [[nodiscard]] Vector6d error(const Odometry& estimate) const;
+
+ private:
+  const SimulatedDrive& drive_;
+  std::optional<SE3> T_level_enu_;
+};
+
+/// Errors at the drive's end.
+struct EndError {
+  Vector6d error = Vector6d::Zero();
+  Matrix6d cov = Matrix6d::Zero();
+  double speed_error = 0.0;
+  double speed_sigma = 0.0;
+};
+EndError end_error(const SimulatedDrive& drive, const WheelConfig& config);
+
+}  // namespace roadfix::test

@@ -1,0 +1,86 @@
+/// Honest covariance over 50 simulated drives, with siblings that must fail.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "drive.h"
+#include "simulation/scenarios.h"
+#include "statistics/consistency.h"
+#include "statistics/summary.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int kSeeds = 50;
+
+struct Nees {
+  double pose = 0.0;  ///< mean normalised square over its degrees of freedom
+  double speed = 0.0;
+  double median_error = 0.0;  ///< m, horizontal
+  double median_sigma = 0.0;  ///< m
+};
+
+Nees nees(const ScenarioConfig& simulated, const WheelConfig& config) {
+  ConsistencyAccumulator pose, speed;
+  std::vector<double> errors, sigmas;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const test::EndError end = test::end_error(simulate(simulated, seed), config);
+    pose.add(normalised_square(end.error, end.cov).value(), 6);
+    speed.add(std::pow(end.speed_error / end.speed_sigma, 2), 1);
+    errors.push_back(end.error.head<2>().norm());
+    sigmas.push_back(std::sqrt(end.cov(0, 0) + end.cov(1, 1)));
+  }
+  const Nees n{pose.ratio(), speed.ratio(), median(errors), median(sigmas)};
+  WARN("pose NEES " << n.pose << ", speed " << n.speed << "; median horizontal error " << n.median_error
+                    << " m beside sigma " << n.median_sigma << " m");
+  return n;
+}
+
+ScenarioConfig city() {
+  ScenarioConfig s = scenario("city_loop");
+  s.duration_s = 60.0;
+  s.mag.rate_hz = 0.0;
+  s.gnss.rate_hz = 0.1;
+  return s;
+}
+
+TEST_CASE("the pose's covariance is what its errors are") {
+  const Nees n = nees(city(), test::matching_config(city()));
+  const Band band = chi_square_band(kSeeds, 6);
+  CHECK(band.holds(n.pose));
+  CHECK(n.speed < 1.7);
+  CHECK(n.speed > 0.4);
+}
+
+TEST_CASE("also with noise that the filter was not told: times 1.5") {
+  ScenarioConfig louder = city();
+  louder.imu.gyro_noise_radps_per_rthz *= 1.5;
+  louder.imu.accel_noise_mps2_per_rthz *= 1.5;
+  louder.wheels.speed_noise_mps *= 1.5;
+  CHECK(chi_square_band(kSeeds, 6).holds(nees(louder, test::matching_config(city())).pose));
+}
+
+TEST_CASE("teeth: an overconfident scale fails") {
+  WheelConfig config = test::matching_config(city());
+  config.sensors.wheel_scale_std *= 0.5;
+  CHECK(nees(city(), config).pose > chi_square_band(kSeeds, 6).high);
+}
+
+TEST_CASE("teeth: a gyro that is called four times too good fails") {
+  WheelConfig config = test::matching_config(city());
+  config.sensors.gyro_noise *= 0.25;
+  config.sensors.gyro_scale_std *= 0.25;
+  config.sensors.gyro_bias_std *= 0.25;
+  CHECK(nees(city(), config).pose > chi_square_band(kSeeds, 6).high);
+}
+
+TEST_CASE("teeth: a timid filter fails from below") {
+  WheelConfig config = test::matching_config(city());
+  config.sensors.wheel_scale_std *= 3.0;
+  config.sensors.accel_bias_std *= 3.0;
+  config.sensors.gyro_scale_std *= 3.0;
+  config.tuning.side_noise *= 3.0;
+  CHECK(nees(city(), config).pose < chi_square_band(kSeeds, 6).low);
+}
+
+}  // namespace
+}  // namespace roadfix
