@@ -6,6 +6,11 @@
 #include "wheel/wheel_odometry.h"
 
 namespace roadfix {
+namespace {
+
+constexpr double kMicrotesla = 1e-6;  ///< T
+
+}  // namespace
 
 WheelInputStatus WheelOdometry::add(const MagSample& mag) {
   const WheelTuning& t = config_.tuning;
@@ -15,8 +20,9 @@ WheelInputStatus WheelOdometry::add(const MagSample& mag) {
   if (standing_.standing && mag_us_) return WheelInputStatus::kNotDue;  // a standing pose does not move
   if (mag_us_ && seconds_between(*mag_us_, mag.t_us) < t.mag_interval) return WheelInputStatus::kNotDue;
   const Tilt tilt = state_.tilt();
-  const Eigen::Vector3d level = level_field(mag.field, tilt.roll, tilt.pitch);
-  const std::optional<MagneticYaw> measured = magnetic_yaw(mag.field, tilt.roll, tilt.pitch);
+  const Eigen::Vector3d field = config_.sensors.soft_iron * (mag.field - kMicrotesla * config_.sensors.hard_iron_ut);
+  const Eigen::Vector3d level = level_field(field, tilt.roll, tilt.pitch);
+  const std::optional<MagneticYaw> measured = magnetic_yaw(field, tilt.roll, tilt.pitch);
   if (!measured) return WheelInputStatus::kBadValue;
   const double strength = level.norm(), dip = std::atan2(-level.z(), level.head<2>().norm());
   if (!mag_us_) {

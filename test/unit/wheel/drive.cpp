@@ -21,7 +21,6 @@ WheelConfig matching_config(const ScenarioConfig& s) {
   c.sensors.wheel_noise = s.wheels.speed_noise_mps / (four ? std::sqrt(2.0) : 1.0);
   c.sensors.mounting_std = s.imu.mounting_std_rad;
   c.sensors.track_width = s.wheels.track_width_m;
-  c.sensors.has_mag = s.mag.rate_hz > 0.0;
   return c;
 }
 
