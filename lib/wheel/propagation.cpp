@@ -5,6 +5,8 @@
 #include "geometry/so3.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 Eigen::Vector3d body_rate(const WheelVector& x, const Eigen::Vector3d& gyro) {

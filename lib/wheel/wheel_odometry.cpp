@@ -5,6 +5,8 @@
 #include "geometry/so3.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 constexpr double kLargestRate = 35.0;           ///< rad/s, full scale of automotive gyros

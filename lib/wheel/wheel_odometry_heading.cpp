@@ -6,6 +6,8 @@
 #include "wheel/wheel_odometry.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 constexpr double kMicrotesla = 1e-6;  ///< T

@@ -5,6 +5,8 @@
 #include "wheel/wheel_odometry.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 constexpr double kLostSpeedSigma = 3.0;  ///< m/s: the speed is no longer known

@@ -7,6 +7,8 @@
 #include "wheel/wheel_odometry.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 constexpr double kStandingSpeedSigma = 1e-3;    ///< m/s

@@ -6,6 +6,8 @@
 
 namespace roadfix {
 
+using namespace wheel;  // the names of the error state
+
 double WheelState::sigma(int index) const { return std::sqrt(P(index, index)); }
 
 void decouple(WheelCovariance& P, int index, double sigma) {

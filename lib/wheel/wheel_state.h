@@ -9,7 +9,8 @@ namespace roadfix {
 
 /// Order of the error state. From kGyroBias on: parameters; of them only the gyro biases are estimated (standing), and
 /// the magnetic offset; the others are considered: they never change, but their uncertainty counts.
-enum WheelErrorIndex {
+namespace wheel {
+enum ErrorIndex {
   kPos = 0,          ///< m, in the level frame
   kYaw = 3,          ///< rad
   kRoll = 4,         ///< rad
@@ -24,15 +25,16 @@ enum WheelErrorIndex {
   kMagOffset = 16,   ///< rad, magnetic yaw minus yaw
   kWheelStates = 17
 };
+}  // namespace wheel
 
-using WheelCovariance = Eigen::Matrix<double, kWheelStates, kWheelStates>;
-using WheelVector = Eigen::Matrix<double, kWheelStates, 1>;
+using WheelCovariance = Eigen::Matrix<double, wheel::kWheelStates, wheel::kWheelStates>;
+using WheelVector = Eigen::Matrix<double, wheel::kWheelStates, 1>;
 
 struct WheelState {
   WheelVector x = WheelVector::Zero();
   WheelCovariance P = WheelCovariance::Zero();
 
-  [[nodiscard]] Tilt tilt() const { return {x(kRoll), x(kPitch)}; }
+  [[nodiscard]] Tilt tilt() const { return {x(wheel::kRoll), x(wheel::kPitch)}; }
   [[nodiscard]] double sigma(int index) const;
 };
 

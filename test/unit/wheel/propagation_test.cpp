@@ -7,6 +7,8 @@
 #include "support/numerical_jacobian.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 double draw(std::mt19937_64& generator, double size) { return std::normal_distribution<double>(0.0, size)(generator); }

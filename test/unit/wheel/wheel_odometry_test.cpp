@@ -10,6 +10,8 @@
 #include "simulation/scenarios.h"
 
 namespace roadfix {
+
+using namespace wheel;  // the names of the error state
 namespace {
 
 using test::LevelTruth;
