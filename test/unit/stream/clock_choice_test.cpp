@@ -1,0 +1,83 @@
+#include "stream/clock_choice.h"
+
+#include <catch2/catch.hpp>
+
+using namespace roadfix;
+using Verdict = ClockChoice::Verdict;
+
+namespace {
+constexpr int kIns = 4;
+constexpr int kVo = 7;
+constexpr int kWheel = 2;
+ClockChoice three_clocks() { return ClockChoice({{kIns, 100}, {kVo, 200}, {kWheel, 300}}); }
+}  // namespace
+
+TEST_CASE("the preferred clock ticks, the others are inputs, an older tick is refused") {
+  ClockChoice clock = three_clocks();
+  REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
+  REQUIRE(clock.changed());
+  REQUIRE(clock.offer(kVo, 1050) == Verdict::kInput);
+  REQUIRE(clock.offer(kWheel, 900) == Verdict::kInput);
+  REQUIRE(clock.offer(99, 1050) == Verdict::kInput);
+  REQUIRE(clock.offer(kIns, 1010) == Verdict::kTick);
+  REQUIRE_FALSE(clock.changed());
+  REQUIRE(clock.offer(kIns, 1010) == Verdict::kRefused);
+  REQUIRE(clock.offer(kIns, 1005) == Verdict::kRefused);
+  REQUIRE(clock.utime() == 1010);
+}
+
+TEST_CASE("a silent clock is followed by the next after its time-out, and comes back at once") {
+  ClockChoice clock = three_clocks();
+  clock.offer(kIns, 1000);
+  clock.offer(kVo, 1050);
+  REQUIRE(clock.offer(kVo, 1100) == Verdict::kInput);  // just at the time-out
+  REQUIRE(clock.offer(kVo, 1101) == Verdict::kTick);
+  REQUIRE(clock.changed());
+  REQUIRE(clock.active_input() == kVo);
+  REQUIRE(clock.offer(kWheel, 1200) == Verdict::kInput);  // the camera is alive
+  REQUIRE(clock.offer(kIns, 1090) == Verdict::kRefused);  // preferred, but behind the clock
+  REQUIRE(clock.offer(kIns, 1110) == Verdict::kTick);
+  REQUIRE(clock.active_input() == kIns);
+}
+
+TEST_CASE("the third clock waits for both before it") {
+  ClockChoice clock = three_clocks();
+  clock.offer(kIns, 1000);
+  clock.offer(kVo, 1050);
+  REQUIRE(clock.offer(kWheel, 1150) == Verdict::kInput);
+  REQUIRE(clock.offer(kWheel, 1250) == Verdict::kInput);
+  REQUIRE(clock.offer(kWheel, 1251) == Verdict::kTick);
+}
+
+TEST_CASE("at the start the first clock has its time-out to appear in") {
+  ClockChoice clock = three_clocks();
+  REQUIRE(clock.offer(kWheel, 1000) == Verdict::kInput);
+  REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
+
+  ClockChoice without = three_clocks();
+  REQUIRE(without.offer(kVo, 1000) == Verdict::kInput);
+  REQUIRE(without.offer(kVo, 1100) == Verdict::kInput);
+  REQUIRE(without.offer(kVo, 1101) == Verdict::kTick);
+}
+
+TEST_CASE("a recorded change replaces the time-outs") {
+  ClockChoice clock = three_clocks();
+  REQUIRE(clock.offer(kIns, 900, false) == Verdict::kInput);
+  REQUIRE(clock.offer(kIns, 1000, true) == Verdict::kTick);
+  REQUIRE(clock.offer(kVo, 5000, false) == Verdict::kInput);
+  REQUIRE(clock.offer(kIns, 1010, false) == Verdict::kTick);  // the active clock needs no entry
+  REQUIRE(clock.offer(kWheel, 1011, true) == Verdict::kTick);
+}
+
+TEST_CASE("a restored choice goes on as the saved one") {
+  ClockChoice clock = three_clocks();
+  clock.offer(kIns, 1000);
+  clock.offer(kVo, 1080);
+  ClockChoice restored = three_clocks();
+  restored.restore(clock.state());
+  for (ClockChoice* c : {&clock, &restored}) {
+    REQUIRE(c->offer(kVo, 1101) == Verdict::kTick);
+    REQUIRE(c->offer(kIns, 1101) == Verdict::kRefused);
+    REQUIRE(c->offer(kIns, 1102) == Verdict::kTick);
+  }
+}
