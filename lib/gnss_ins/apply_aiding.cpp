@@ -1,0 +1,109 @@
+#include "gnss_ins/apply_aiding.h"
+
+#include <cmath>
+
+#include "statistics/chi_square.h"
+
+namespace roadfix {
+
+namespace {
+
+// Below this speed an unsigned wheel speed is not told apart from its negative.
+constexpr double kUnsignedMin = 0.3;  // m/s
+
+AidingRecord not_ready(AidingSource source, int64_t t_us) {
+  AidingRecord r;
+  r.t_us = t_us;
+  r.source = source;
+  return r;
+}
+
+Measurement<3> position_of(const InsCore& core, const Pending& p, const Eigen::Vector3d& lever) {
+  return gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()), lever);
+}
+
+}  // namespace
+
+Gates::Gates(double sigma) {
+  const double tail = std::erfc(sigma / std::sqrt(2.0));
+  for (int dof = 1; dof <= 3; ++dof) nis[static_cast<size_t>(dof)] = chi_square_quantile(1.0 - tail, dof);
+}
+
+AidingApplier::AidingApplier(const GnssInsConfig& config) : config_(config) {}
+
+AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& gates) const {
+  const GnssInsVehicle& v = config_.vehicle;
+  const NavState& x = core.state();
+  switch (p.kind) {
+    case PendingKind::kPosition:
+      return core.fuse(AidingSource::kGnssPosition, p.t_us, position_of(core, p, v.p_imu_antenna), gates.nis[3]);
+    case PendingKind::kVelocity:
+      return core.fuse(AidingSource::kGnssVelocity, p.t_us,
+                       gnss_velocity(x, core.motion(), p.value, p.cov, p.ahead(x), v.p_imu_antenna), gates.nis[3]);
+    case PendingKind::kHeading:
+      return core.fuse(AidingSource::kGnssHeading, p.t_us, vehicle_yaw(x, p.value.x(), std::sqrt(p.cov(0, 0))),
+                       gates.nis[1]);
+    case PendingKind::kWheels:
+      return wheels(core, p, gates);
+    case PendingKind::kMag:
+      return core.fuse(AidingSource::kMagHeading, p.t_us,
+                       magnetic_heading(x, p.value, v.magnetic_declination, config_.aiding.mag_std), gates.nis[1]);
+  }
+  return not_ready(AidingSource::kGnssPosition, p.t_us);
+}
+
+AidingRecord AidingApplier::apply_level(InsCore& core, const Pending& p, const Gates& gates) const {
+  const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
+  Measurement<2> level;
+  level.residual = all.residual.head<2>();
+  level.H = all.H.topRows<2>();
+  level.R = all.R.topLeftCorner<2, 2>();
+  return core.fuse(AidingSource::kGnssPosition, p.t_us, level, gates.nis[2]);
+}
+
+AidingRecord AidingApplier::apply_height(InsCore& core, const Pending& p, const Gates& gates) const {
+  const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
+  Measurement<1> height;
+  height.residual = all.residual.tail<1>();
+  height.H = all.H.bottomRows<1>();
+  height.R = all.R.bottomRightCorner<1, 1>();
+  return core.fuse(AidingSource::kGnssPosition, p.t_us, height, gates.nis[1]);
+}
+
+AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates& gates) const {
+  const NavState& x = core.state();
+  const double sigma = config_.vehicle.wheel_noise;
+  double speed = p.value.x();
+  Measurement<1> m = wheel_speed(x, core.motion(), speed, sigma, p.ahead(x), config_.vehicle.p_imu_vehicle);
+  if (p.direction == WheelDirection::kReverse) speed = -std::abs(speed);
+  if (p.direction == WheelDirection::kForward) speed = std::abs(speed);
+  if (p.direction == WheelDirection::kUnknown) {
+    const double predicted = p.value.x() - m.residual(0);
+    if (std::abs(speed) < kUnsignedMin || std::abs(predicted) < kUnsignedMin)
+      return not_ready(AidingSource::kWheelSpeed, p.t_us);
+    speed = std::copysign(speed, predicted);
+  }
+  m.residual(0) += speed - p.value.x();
+  return core.fuse(AidingSource::kWheelSpeed, p.t_us, m, gates.nis[1]);
+}
+
+AidingRecord AidingApplier::sideslip(InsCore& core, const Gates& gates) const {
+  const NavState& x = core.state();
+  const AidingConfig& a = config_.aiding;
+  const double sigma = std::hypot(a.sideslip_std, a.sideslip_per_speed * x.velocity.norm());
+  return core.fuse(AidingSource::kNoSideslip, x.t_us,
+                   no_sideslip(x, core.motion(), sigma, config_.vehicle.p_imu_vehicle), gates.nis[2]);
+}
+
+AidingRecord AidingApplier::standing_velocity(InsCore& core, const Gates& gates) const {
+  return core.fuse(AidingSource::kZeroVelocity, core.state().t_us,
+                   zero_velocity(core.state(), config_.aiding.zero_velocity_std), gates.nis[3]);
+}
+
+AidingRecord AidingApplier::standing_rate(InsCore& core, const ImuBlock& block, const Gates& gates) const {
+  const double sigma = std::hypot(config_.aiding.zero_rate_std, config_.vehicle.gyro_noise / std::sqrt(block.duration));
+  return core.fuse(AidingSource::kZeroRate, core.state().t_us,
+                   zero_rate(core.state(), block.gyro, core.earth().rate(), sigma), gates.nis[3]);
+}
+
+}  // namespace roadfix

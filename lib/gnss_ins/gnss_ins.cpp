@@ -1,0 +1,237 @@
+#include "gnss_ins/gnss_ins.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/frames.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr double kMaxLag = 1.5;       // s behind the horizon, for receivers that stamp late
+constexpr double kBridgeAccel = 2.0;  // m/s2, what a car may do unseen in a gap of the IMU
+constexpr double kBridgeRate = 0.3;   // rad/s
+
+bool plausible(const ImuSample& s, const PropagationConfig& c) {
+  return s.gyro.allFinite() && s.accel.allFinite() && s.gyro.norm() < c.max_gyro && s.accel.norm() < c.max_accel;
+}
+
+int64_t lag_of(const GnssInsVehicle& v) {
+  const double latency = std::max(v.position_latency_std, v.velocity_latency_std);
+  return static_cast<int64_t>(1e6 * std::min(kMaxLag, 3.0 * std::hypot(latency, v.time_offset_std)));
+}
+
+}  // namespace
+
+GnssIns::GnssIns(const GnssInsConfig& config)
+    : config_(config),
+      applier_(config),
+      gates_(config.aiding.gate_sigma),
+      no_gates_(1e3),
+      monitor_(config),
+      screen_(config.screen),
+      bank_(config),
+      lag_us_(lag_of(config.vehicle)) {
+  no_gates_.nis.fill(1e12);
+  records_.reserve(1024);
+}
+
+InputStatus GnssIns::see(const ImuSample& imu) {
+  if (!plausible(imu, config_.propagation)) {
+    ++bad_imu_;
+    return InputStatus::kBadInput;
+  }
+  const int64_t newest = ring_.empty() ? last_step_us_ : ring_.back().t_us;
+  if (imu.t_us <= newest) return InputStatus::kOutOfOrder;
+  ring_.push(imu);
+  return InputStatus::kAccepted;
+}
+
+InputStatus GnssIns::advance(const ImuSample& imu) {
+  InputStatus status = InputStatus::kAccepted;
+  const int64_t newest = ring_.empty() ? last_step_us_ : ring_.back().t_us;
+  if (imu.t_us > newest) status = see(imu);
+  while (!ring_.empty() && ring_.front().t_us <= imu.t_us - lag_us_) {
+    step(ring_.front());
+    ring_.pop();
+  }
+  return status;
+}
+
+void GnssIns::add(const GnssFix& fix, int64_t id) {
+  const AidingStatus screened = screen_.check(fix);
+  if (screened != AidingStatus::kAccepted) {
+    AidingRecord r;
+    r.t_us = fix.t_us;
+    r.status = screened;
+    note(r, id);
+    return;
+  }
+  if (!anchor_) {
+    anchor_ = fix.antenna;
+    enu_.emplace(fix.antenna);
+  }
+  fix_before_ = fix_;
+  fix_ = fix;
+  const Eigen::Matrix3d to_enu = enu_->R_anchor_enu_at(fix.antenna);
+  const AidingConfig& a = config_.aiding;
+  const auto floored = [&](Eigen::Matrix3d cov, double floor) {
+    for (int i = 0; i < 3; ++i) cov(i, i) = std::max(cov(i, i), floor * floor);
+    return Eigen::Matrix3d(to_enu * cov * to_enu.transpose());
+  };
+  Pending p;
+  p.t_us = fix.t_us;
+  p.id = id;
+  p.value = enu_->enu(fix.antenna);
+  p.cov = floored(fix.cov_enu, a.position_floor);
+  pending_.push(p);
+  if (fix.velocity && a.use_gnss_velocity) {
+    p.kind = PendingKind::kVelocity;
+    p.value = to_enu * fix.velocity->enu;
+    const bool given = fix.velocity->cov_enu.diagonal().minCoeff() > 0.0;
+    p.cov = floored(fix.velocity->cov_enu, given ? a.velocity_floor : a.velocity_default);
+    pending_.push(p);
+  }
+  if (fix.heading && std::isfinite(fix.heading->heading)) {
+    p.kind = PendingKind::kHeading;
+    const double yaw = 0.5 * kPi - fix.heading->heading;
+    const Eigen::Vector3d direction = to_enu * Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+    p.value = Eigen::Vector3d(std::atan2(direction.y(), direction.x()), 0.0, 0.0);
+    const double sigma = std::max(fix.heading->sigma, a.heading_floor * kDegree);
+    p.cov = sigma * sigma * Eigen::Matrix3d::Identity();
+    pending_.push(p);
+  }
+}
+
+void GnssIns::add(const WheelSample& wheels, int64_t id) {
+  if (!config_.aiding.use_wheels) return;
+  Pending p;
+  p.kind = PendingKind::kWheels;
+  p.t_us = wheels.t_us;
+  p.id = id;
+  p.direction = wheels.direction;
+  // Four speeds: the rear axle's mean is the speed of its centre.
+  p.value.x() = wheels.num_speeds == 4 ? 0.5 * (wheels.speeds[2] + wheels.speeds[3]) : wheels.speeds[0];
+  if (!std::isfinite(p.value.x()) || std::abs(p.value.x()) > 100.0) {
+    AidingRecord r;
+    r.t_us = wheels.t_us;
+    r.source = AidingSource::kWheelSpeed;
+    r.status = AidingStatus::kBadInput;
+    note(r, id);
+    return;
+  }
+  if (seconds_between(last_wheel_us_, wheels.t_us) < config_.aiding.wheel_interval - 0.005) return;
+  last_wheel_us_ = wheels.t_us;
+  pending_.push(p);
+}
+
+void GnssIns::add(const MagSample& mag, int64_t id) {
+  if (!config_.aiding.use_mag || !mag.field.allFinite() || mag.field.norm() <= 0.0) return;
+  Pending p;
+  p.kind = PendingKind::kMag;
+  p.t_us = mag.t_us;
+  p.id = id;
+  p.value = mag.field;
+  pending_.push(p);
+}
+
+void GnssIns::note(AidingRecord record, int64_t id) {
+  record.id = id;
+  if (record.status == AidingStatus::kAccepted || record.status == AidingStatus::kReset)
+    used_at_us_[static_cast<size_t>(record.source)] = record.t_us;
+  if (records_.size() < records_.capacity()) records_.push_back(record);
+}
+
+void GnssIns::step(const ImuSample& imu) {
+  const double dt = last_step_us_ == 0 ? 0.0 : seconds_between(last_step_us_, imu.t_us);
+  last_step_us_ = imu.t_us;
+  if (dt <= 0.0) return;
+  const PropagationConfig& c = config_.propagation;
+  const bool gap = dt > c.max_gap;
+  const bool block_done = !gap && monitor_.add(imu, dt);
+  ImuNoise noise = monitor_.noise();
+  if (gap) ++gaps_;
+  if (gap || monitor_.frozen()) {
+    // White noise that over this time does what an unseen manoeuvre may do, (M.18).
+    noise.accel = kBridgeAccel * std::sqrt(dt);
+    noise.gyro = kBridgeRate * std::sqrt(dt);
+  }
+  if (dt > c.realign_gap) {
+    phase_ = AlignmentPhase::kWaiting;
+    core_.reset();
+    bank_.stop();
+    pending_.clear();
+  }
+  if (phase_ == AlignmentPhase::kDone) {
+    core_->predict(imu, dt, noise);
+    step_aligned(imu, block_done);
+  } else if (phase_ == AlignmentPhase::kHeading) {
+    step_heading(imu, dt, noise, block_done);
+  } else {
+    phase_ = fix_ ? AlignmentPhase::kLevelling : AlignmentPhase::kWaiting;
+    if (block_done && fix_) try_start(imu);
+  }
+}
+
+void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
+  InsCore& core = *core_;
+  pending_.take_due([&]() -> const NavState& { return core.state(); }, [&](const Pending& p) { use(p); });
+  if (config_.aiding.use_sideslip && imu.t_us >= next_sideslip_us_) {
+    next_sideslip_us_ = imu.t_us + static_cast<int64_t>(1e6 * config_.aiding.sideslip_interval);
+    note(applier_.sideslip(core, gates_), 0);
+    forward_stale_ = true;
+  }
+  if (block_done && standing_now(core)) {
+    note(applier_.standing_velocity(core, gates_), 0);
+    note(applier_.standing_rate(core, monitor_.block(), gates_), 0);
+    forward_stale_ = true;
+  }
+}
+
+void GnssIns::use(const Pending& p) {
+  forward_stale_ = true;
+  if (p.kind == PendingKind::kPosition)
+    use_position(p);
+  else
+    note(applier_.apply(*core_, p, gates_), p.id);
+}
+
+void GnssIns::use_position(const Pending& p) {
+  AidingRecord r = applier_.apply(*core_, p, gates_);
+  if (r.status == AidingStatus::kGated) {
+    const AidingRecord level = applier_.apply_level(*core_, p, gates_);
+    if (level.status == AidingStatus::kAccepted) r = level;
+  }
+  if (r.status == AidingStatus::kAccepted) {
+    refused_ = 0;
+  } else {
+    if (refused_++ == 0) refused_since_us_ = p.t_us;
+    const AlignmentConfig& a = config_.alignment;
+    if (refused_ >= a.recovery_fixes && seconds_between(refused_since_us_, p.t_us) >= a.recovery_s) {
+      recover(p);
+      r.status = AidingStatus::kReset;
+    }
+  }
+  note(r, p.id);
+}
+
+void GnssIns::recover(const Pending& p) {
+  const NavState before = core_->state();
+  ErrorMatrix P = core_->covariance();
+  // The filter's position and velocity are given up; attitude and biases are kept, with room to be wrong.
+  P.middleRows<6>(kPos).setZero();
+  P.middleCols<6>(kPos).setZero();
+  P.diagonal().segment<3>(kPos).setConstant(1e4);
+  P.diagonal().segment<3>(kVel).setConstant(4.0);
+  P.diagonal().segment<3>(kAtt) += Eigen::Vector3d(1e-4, 1e-4, 3e-3);
+  core_->initialise(before, P);
+  (void)applier_.apply(*core_, p, no_gates_);
+  const NavState& after = core_->state();
+  ++reset_counter_;
+  reset_delta_.p = after.position - before.position;
+  reset_delta_.q = before.q_enu_imu.conjugate() * after.q_enu_imu;
+  refused_ = 0;
+}
+
+}  // namespace roadfix

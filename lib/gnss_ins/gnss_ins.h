@@ -1,0 +1,116 @@
+/// GNSS/INS estimator: alignment, error-state filter, aiding, gates and recovery. Derivation: lib/gnss_ins/MODEL.md.
+///
+/// Time: inputs come in the order of their stamps as the caller's horizon passes them (advance, add); see() hands in
+/// the newest IMU sample ahead of the horizon, and output() is for that one. The state itself stays behind the horizon
+/// by the longest latency that the calibration allows, so that every measurement is used at its own moment.
+/// Guarantees: same inputs in the same order give the same bits; no allocation after the first fix; one thread.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "gnss_ins/apply_aiding.h"
+#include "gnss_ins/gnss_screen.h"
+#include "gnss_ins/heading_bank.h"
+#include "gnss_ins/imu_ring.h"
+
+namespace roadfix {
+
+enum class InputStatus { kAccepted, kBadInput, kOutOfOrder };
+enum class AlignmentPhase { kWaiting, kLevelling, kHeading, kDone };
+
+struct GnssInsStatus {
+  AlignmentPhase phase = AlignmentPhase::kWaiting;
+  std::string waits_for;  ///< plain words; empty once aligned
+  int aided_by = 0;       ///< bit i: AidingSource i used within its last coasting time
+  bool coasting = false;
+  int64_t coasting_since_us = 0;
+  GnssQuality gnss_quality = GnssQuality::kAbsent;
+  std::string gnss_reason;
+  int64_t bad_imu_samples = 0;
+  bool imu_frozen = false;
+  int64_t imu_gaps = 0;
+};
+
+struct GnssInsOutput {
+  Odometry odometry;   ///< imu origin and axes in the anchor's enu
+  std::string reason;  ///< plain words, empty when all is well
+  int reset_counter = 0;
+  SE3 reset_delta;  ///< of the last jump: p new minus old in enu; q_old^-1 q_new
+};
+
+class GnssIns {
+ public:
+  explicit GnssIns(const GnssInsConfig& config);
+
+  InputStatus see(const ImuSample& imu);      ///< newest sample, ahead of the horizon
+  InputStatus advance(const ImuSample& imu);  ///< the horizon has passed this sample
+  void add(const GnssFix& fix, int64_t id = 0);
+  void add(const WheelSample& wheels, int64_t id = 0);
+  void add(const MagSample& mag, int64_t id = 0);
+
+  /// Nothing before the first fix.
+  [[nodiscard]] std::optional<Geodetic> anchor() const { return anchor_; }
+  [[nodiscard]] GnssInsOutput output();
+  [[nodiscard]] GnssInsStatus status() const;
+  /// Filter in use (the leading hypothesis while aligning); nothing before alignment starts.
+  [[nodiscard]] const InsCore* core() const;
+  /// What was tried since the last call to clear_records().
+  [[nodiscard]] const std::vector<AidingRecord>& records() const { return records_; }
+  void clear_records() { records_.clear(); }
+
+  /// Everything that later outputs depend on; load() throws std::runtime_error on bytes that are no such state.
+  [[nodiscard]] std::vector<uint8_t> save() const;
+  void load(std::span<const uint8_t> bytes);
+
+ private:
+  void step(const ImuSample& imu);
+  void step_aligned(const ImuSample& imu, bool block_done);
+  void step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done);
+  void try_start(const ImuSample& imu);
+  bool standing_now(const InsCore& core) const;
+  void use(const Pending& p);
+  void use_position(const Pending& p);
+  void recover(const Pending& p);
+  void note(AidingRecord record, int64_t id);
+  void rebase_forward();
+  template <class Archive>
+  void serialise(Archive& a);
+
+  GnssInsConfig config_;
+  AidingApplier applier_;
+  Gates gates_, no_gates_;
+  ImuMonitor monitor_;
+  GnssScreen screen_;
+  ImuRing ring_;
+  PendingQueue pending_;
+  HeadingBank bank_;
+  std::optional<Geodetic> anchor_;
+  std::optional<EnuAnchor> enu_;
+  std::optional<InsCore> core_, forward_;
+  AlignmentPhase phase_ = AlignmentPhase::kWaiting;
+
+  int64_t lag_us_ = 0;
+  int64_t last_step_us_ = 0;  // stamp of the last sample used
+  int64_t forward_to_ = 0;    // ring index up to which forward_ went
+  bool forward_stale_ = true;
+  int64_t cov_at_us_ = 0;  // epoch of the cached output covariance
+  Matrix6d cov_pose_ = Matrix6d::Zero();
+  Eigen::Matrix3d cov_velocity_ = Eigen::Matrix3d::Zero();
+  int64_t next_sideslip_us_ = 0;
+  int64_t last_wheel_us_ = 0;
+  std::optional<GnssFix> fix_, fix_before_;  // newest good ones, for the start
+  std::optional<double> wheel_speed_;
+  std::array<int64_t, kAidingSources> used_at_us_{};
+  int64_t coasting_since_us_ = 0;
+  int64_t refused_since_us_ = 0;
+  int refused_ = 0;
+  int reset_counter_ = 0;
+  SE3 reset_delta_;
+  int64_t bad_imu_ = 0, gaps_ = 0;
+  std::vector<AidingRecord> records_;
+};
+
+}  // namespace roadfix

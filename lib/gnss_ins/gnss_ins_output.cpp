@@ -1,0 +1,147 @@
+// What is published: the state carried forward to the newest IMU sample, and the status in words.
+#include <cmath>
+
+#include "geometry/so3.h"
+#include "gnss_ins/gnss_ins.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr double kForwardSpan = 1.0;     // s that one transition of the forward covariance may cover
+constexpr double kCovarianceAge = 0.05;  // s that an output covariance may be used again
+
+// Covariance of pose and velocity at the true time of the output, (M.40)-(M.42).
+struct OutputCovariance {
+  Matrix6d pose;
+  Eigen::Matrix3d velocity;
+
+  OutputCovariance(const NavState& x, const Motion& m, const ErrorMatrix& P) {
+    const Eigen::Matrix3d Rt = x.q_enu_imu.toRotationMatrix().transpose();
+    Eigen::Matrix<double, 9, 10> J = Eigen::Matrix<double, 9, 10>::Zero();
+    J.block<3, 3>(0, 0).setIdentity();
+    J.block<3, 3>(0, 3) = x.imu_offset * Eigen::Matrix3d::Identity();
+    J.block<3, 1>(0, 9) = x.velocity + x.imu_offset * m.acceleration;
+    J.block<3, 3>(3, 6) = Rt;
+    J.block<3, 1>(3, 9) = m.rate;
+    J.block<3, 3>(6, 3) = Rt;
+    J.block<3, 3>(6, 6) = Rt * skew(x.velocity);
+    J.block<3, 1>(6, 9) = Rt * m.acceleration;
+    Eigen::Matrix<double, 10, 10> used;
+    used.topLeftCorner<9, 9>() = P.topLeftCorner<9, 9>();
+    used.topRightCorner<9, 1>() = P.block<9, 1>(0, kImuOffset);
+    used.bottomLeftCorner<1, 9>() = P.block<1, 9>(kImuOffset, 0);
+    used(9, 9) = P(kImuOffset, kImuOffset);
+    const Eigen::Matrix<double, 9, 9> all = J * used * J.transpose();
+    pose = 0.5 * (all.topLeftCorner<6, 6>() + all.topLeftCorner<6, 6>().transpose());
+    velocity = 0.5 * (all.bottomRightCorner<3, 3>() + all.bottomRightCorner<3, 3>().transpose());
+  }
+};
+
+const char* waiting_for(AlignmentPhase phase, bool has_imu, bool has_fix) {
+  switch (phase) {
+    case AlignmentPhase::kDone:
+      return "";
+    case AlignmentPhase::kHeading:
+      return "heading: drive, with turns or changes of speed";
+    case AlignmentPhase::kLevelling:
+      return "levelling: a second fix and calm samples";
+    case AlignmentPhase::kWaiting:
+      break;
+  }
+  if (!has_imu) return "IMU samples";
+  return has_fix ? "levelling" : "a GNSS fix";
+}
+
+}  // namespace
+
+const InsCore* GnssIns::core() const {
+  if (phase_ == AlignmentPhase::kDone) return &*core_;
+  return phase_ == AlignmentPhase::kHeading ? &bank_.leader() : nullptr;
+}
+
+void GnssIns::rebase_forward() {
+  const InsCore& base = *core();
+  const double behind = forward_ ? seconds_between(base.state().t_us, forward_->state().t_us) : 0.0;
+  if (forward_stale_ || !forward_ || forward_to_ < ring_.begin() ||
+      behind > kForwardSpan + 1e-6 * static_cast<double>(lag_us_)) {
+    forward_.emplace(base);
+    forward_to_ = ring_.begin();
+    forward_stale_ = false;
+    cov_at_us_ = 0;
+  }
+  const ImuNoise noise = monitor_.noise();
+  for (; forward_to_ < ring_.end(); ++forward_to_) {
+    const ImuSample& s = ring_[forward_to_];
+    const double dt = seconds_between(forward_->state().t_us, s.t_us);
+    if (dt > 0.0) forward_->predict(s, dt, noise);
+  }
+}
+
+GnssInsOutput GnssIns::output() {
+  GnssInsOutput out;
+  out.reset_counter = reset_counter_;
+  out.reset_delta = reset_delta_;
+  out.odometry.t_us = ring_.empty() ? last_step_us_ : ring_.back().t_us;
+  if (core() == nullptr) {
+    out.reason = std::string("waits for ") + waiting_for(phase_, last_step_us_ != 0, fix_.has_value());
+    return out;
+  }
+  rebase_forward();
+  const NavState& x = forward_->state();
+  const Motion& m = forward_->motion();
+  const double o = x.imu_offset;  // the sample stamped t was taken o earlier, so t itself lies o ahead
+  const Eigen::Vector3d v = x.velocity + o * m.acceleration;
+  SE3& T = out.odometry.T_frame_vehicle;
+  T.p = x.position + o * (x.velocity + 0.5 * o * m.acceleration);
+  T.q = normalized_positive(x.q_enu_imu * exp_q(o * m.rate));
+  out.odometry.velocity = T.q.conjugate() * v;
+  out.odometry.angular_rate = m.rate;
+  if (cov_at_us_ == 0 || seconds_between(cov_at_us_, x.t_us) >= kCovarianceAge) {
+    const OutputCovariance cov(x, m, forward_->covariance());
+    cov_pose_ = cov.pose;
+    cov_velocity_ = cov.velocity;
+    cov_at_us_ = x.t_us;
+  }
+  out.odometry.cov_pose = cov_pose_;
+  out.odometry.cov_velocity = cov_velocity_;
+
+  const GnssInsStatus s = status();
+  const double horizontal = std::sqrt(cov_pose_(0, 0) + cov_pose_(1, 1));
+  if (phase_ != AlignmentPhase::kDone) {
+    out.reason = "waits for " + s.waits_for;
+  } else if (!(horizontal < config_.alignment.invalid_sigma_m)) {
+    out.reason = "position too uncertain";
+  } else {
+    out.odometry.validity = s.coasting ? Validity::kCoasting : Validity::kValid;
+    if (s.coasting) out.reason = "coasting without GNSS";
+    if (s.imu_frozen) out.reason = "IMU readings do not change";
+  }
+  return out;
+}
+
+GnssInsStatus GnssIns::status() const {
+  GnssInsStatus s;
+  s.phase = phase_;
+  s.waits_for = waiting_for(phase_, last_step_us_ != 0, fix_.has_value());
+  s.gnss_quality = screen_.quality();
+  s.gnss_reason = screen_.reason();
+  s.bad_imu_samples = bad_imu_;
+  s.imu_gaps = gaps_;
+  s.imu_frozen = monitor_.frozen();
+  const double hold = config_.alignment.coasting_s;
+  int64_t anchored = 0;
+  for (size_t i = 0; i < kAidingSources; ++i) {
+    const int64_t at = used_at_us_[i];
+    if (at == 0) continue;
+    if (seconds_between(at, last_step_us_) <= hold) s.aided_by |= 1 << i;
+    const auto source = static_cast<AidingSource>(i);
+    if (source == AidingSource::kGnssPosition || source == AidingSource::kZeroVelocity)
+      anchored = std::max(anchored, at);
+  }
+  s.coasting = phase_ == AlignmentPhase::kDone && seconds_between(anchored, last_step_us_) > hold;
+  s.coasting_since_us = s.coasting ? anchored : 0;
+  return s;
+}
+
+}  // namespace roadfix

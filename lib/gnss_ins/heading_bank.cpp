@@ -1,0 +1,119 @@
+#include "gnss_ins/heading_bank.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/euler.h"
+#include "geometry/frames.h"
+#include "geometry/so3.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr double kNoGate = 1e12;
+// A record counts at most this much against a hypothesis: one wild measurement must not decide.
+constexpr double kMostNis = 50.0;
+constexpr double kSameHeading = 10.0 * kDegree;
+
+// Roll and pitch that turn the mean specific force upright, with the yaw asked for.
+Eigen::Quaterniond attitude(const Eigen::Vector3d& mean_accel, double yaw) {
+  const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(mean_accel, Eigen::Vector3d::UnitZ());
+  return (exp_q(Eigen::Vector3d(0.0, 0.0, yaw - yaw_of(level))) * level).normalized();
+}
+
+ErrorMatrix start_covariance(const GnssInsConfig& c, double yaw_std) {
+  const GnssInsVehicle& v = c.vehicle;
+  ErrorVector std;
+  std.setZero();
+  std.segment<3>(kPos).setConstant(1000.0);
+  std.segment<3>(kVel).setConstant(100.0);
+  std.segment<3>(kAtt) << 0.5, 0.5, yaw_std;
+  std.segment<3>(kGyroBias).setConstant(v.gyro_bias_std);
+  std.segment<3>(kAccelBias).setConstant(v.accel_bias_std);
+  std.segment<6>(kGyroScale).setConstant(v.scale_std);
+  std(kWheelScale) = v.wheel_scale_std;
+  std.segment<2>(kMounting) = v.mounting_std.tail<2>();
+  std(kPositionLatency) = v.position_latency_std;
+  std(kVelocityLatency) = v.velocity_latency_std;
+  std(kImuOffset) = v.time_offset_std;
+  std(kNoSlipX) = c.aiding.no_slip_x_std;
+  return std.cwiseAbs2().asDiagonal();
+}
+
+}  // namespace
+
+void HeadingBank::start(const Geodetic& anchor, const StartState& s) {
+  cores_.clear();
+  log_weights_.clear();
+  leader_ = 0;
+  const int n = config_.alignment.headings;
+  cores_.reserve(static_cast<size_t>(n));
+  log_weights_.reserve(static_cast<size_t>(n));
+  if (s.yaw) {
+    add_hypothesis(anchor, s, *s.yaw, s.yaw_std);
+    return;
+  }
+  // The first points along the motion where there is one; the order decides nothing else.
+  const double first = s.velocity.head<2>().norm() > 1.0 ? std::atan2(s.velocity.y(), s.velocity.x()) : 0.0;
+  for (int i = 0; i < n; ++i)
+    add_hypothesis(anchor, s, wrap_angle(first + 2.0 * kPi * i / n), config_.alignment.heading_std_deg * kDegree);
+}
+
+void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, double yaw, double yaw_std) {
+  NavState x;
+  x.t_us = s.t_us;
+  x.q_enu_imu = attitude(s.mean_accel, yaw);
+  x.velocity = s.velocity;
+  x.position = s.antenna - x.q_enu_imu * config_.vehicle.p_imu_antenna;
+  cores_.emplace_back(config_, anchor);
+  log_weights_.push_back(0.0);
+  InsCore& core = cores_.back();
+  // Delays show through velocity and acceleration, whose direction is not known yet.
+  core.consider({kPositionLatency, 3});
+  core.initialise(x, start_covariance(config_, yaw_std));
+  // Using what the mean came from as measurements gives every correlation: tilt with accelerometer bias, position with
+  // attitude through the lever arm.
+  const Eigen::Vector3d gravity = core.earth().gravity(x.position);
+  (void)core.fuse(AidingSource::kZeroVelocity, s.t_us, levelling(x, s.mean_accel, gravity, s.accel_std), kNoGate);
+  const Motion still;
+  (void)core.fuse(AidingSource::kGnssPosition, s.t_us,
+                  gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0, config_.vehicle.p_imu_antenna),
+                  kNoGate);
+  Measurement<3> velocity = zero_velocity(core.state(), s.velocity_std);
+  velocity.residual += s.velocity;
+  (void)core.fuse(AidingSource::kGnssVelocity, s.t_us, velocity, kNoGate);
+  if (s.standing)
+    (void)core.fuse(AidingSource::kZeroRate, s.t_us,
+                    zero_rate(core.state(), s.mean_gyro, core.earth().rate(), config_.aiding.zero_rate_std), kNoGate);
+}
+
+void HeadingBank::predict(const ImuSample& imu, double dt, const ImuNoise& noise) {
+  for (InsCore& core : cores_) core.predict(imu, dt, noise);
+}
+
+void HeadingBank::weigh(size_t i, const AidingRecord& r) {
+  if (r.status != AidingStatus::kAccepted && r.status != AidingStatus::kGated) return;
+  log_weights_[i] += std::max(r.log_likelihood, r.log_likelihood + 0.5 * (r.nis - kMostNis));
+}
+
+void HeadingBank::normalise() {
+  leader_ = static_cast<size_t>(std::max_element(log_weights_.begin(), log_weights_.end()) - log_weights_.begin());
+  const double most = log_weights_[leader_];
+  for (double& w : log_weights_) w -= most;
+}
+
+bool HeadingBank::confirmed() const {
+  if (cores_.empty()) return false;
+  const double yaw = yaw_of(leader().state().q_enu_imu);
+  const double std = std::sqrt(leader().covariance()(kAtt + 2, kAtt + 2));
+  if (std > config_.alignment.confirm_std_deg * kDegree) return false;
+  double others = 0.0, same = 0.0;
+  for (size_t i = 0; i < cores_.size(); ++i) {
+    const bool agrees = std::abs(wrap_angle(yaw_of(cores_[i].state().q_enu_imu) - yaw)) < kSameHeading;
+    (agrees ? same : others) += std::exp(log_weights_[i]);
+  }
+  return same / (same + others) > config_.alignment.confirm_probability;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,54 @@
+#include "gnss_ins/ins_core.h"
+
+#include <cmath>
+
+namespace roadfix {
+
+namespace {
+
+// Rate and acceleration are smoothed over this time: long enough against vibration, short against a car's manoeuvres.
+constexpr double kMotionTime = 0.05;  // s
+
+}  // namespace
+
+InsCore::InsCore(const GnssInsConfig& config, const Geodetic& anchor) : config_(config), earth_(anchor) {}
+
+void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
+  x_ = x;
+  P_ = P;
+  sums_ = TransitionSums();
+  last_ = InertialStep();
+  motion_ = Motion();
+}
+
+void InsCore::predict(const ImuSample& imu, double dt, const ImuNoise& noise) {
+  const InertialStep step = corrected(x_, imu, dt);
+  const Eigen::Matrix3d R = x_.q_enu_imu.toRotationMatrix();
+  sums_.add(R, step, noise.gyro, noise.accel);
+  const Eigen::Vector3d v_before = x_.velocity;
+  mechanise(x_, last_, step, earth_);
+  x_.t_us = imu.t_us;
+  const double fade = std::exp(-dt / config_.vehicle.correlation_s);
+  x_.gyro_bias *= fade;
+  x_.accel_bias *= fade;
+  x_.gyro_scale *= fade;
+  x_.accel_scale *= fade;
+  const double weight = last_.dt > 0.0 ? dt / (dt + kMotionTime) : 1.0;
+  motion_.rate += weight * (step.rate - R.transpose() * earth_.rate() - motion_.rate);
+  motion_.acceleration += weight * ((x_.velocity - v_before) / dt - motion_.acceleration);
+  last_ = step;
+  if (sums_.duration >= config_.propagation.covariance_interval - 1e-9) flush();
+}
+
+ErrorMatrix InsCore::covariance() const {
+  ErrorMatrix P = P_;
+  if (sums_.duration > 0.0) propagate_covariance(P, Transition(sums_, earth_.rate(), config_), sums_);
+  return P;
+}
+
+void InsCore::flush() {
+  propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_);
+  sums_ = TransitionSums();
+}
+
+}  // namespace roadfix

@@ -1,0 +1,76 @@
+/// One error-state Kalman filter: mean, covariance and how they move. It knows nothing of alignment, gates or time
+/// order; several of them run side by side while the heading is unknown.
+///
+/// Guarantees: same inputs in the same order give the same bits; a refused measurement changes nothing, not even where
+/// the covariance steps begin and end; no allocation. Not thread safe.
+#pragma once
+
+#include "gnss_ins/aiding.h"
+#include "gnss_ins/covariance_step.h"
+
+namespace roadfix {
+
+/// White noise of the IMU as it is now: datasheet or measured scatter, whichever is larger.
+struct ImuNoise {
+  double gyro = 0.0;   ///< rad/s/sqrt(Hz)
+  double accel = 0.0;  ///< m/s2/sqrt(Hz)
+};
+
+class InsCore {
+ public:
+  InsCore(const GnssInsConfig& config, const Geodetic& anchor);
+
+  void initialise(const NavState& x, const ErrorMatrix& P);
+
+  /// States that measurements do not move from now on, though their uncertainty counts.
+  void consider(const StateRange& states) { considered_ = states; }
+
+  /// Moves mean and covariance over the `dt` seconds that end at imu.t_us, (M.1)-(M.16).
+  void predict(const ImuSample& imu, double dt, const ImuNoise& noise);
+
+  /// Uses m unless its normalised innovation squared exceeds `gate`.
+  template <int Rows>
+  AidingRecord fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
+    const ErrorMatrix P_now = covariance();
+    const Innovation<Rows> innovation(P_now, m);
+    AidingRecord record = record_of(source, t_us, m, innovation);
+    record.status = !innovation.usable       ? AidingStatus::kBadInput
+                    : innovation.nis <= gate ? AidingStatus::kAccepted
+                                             : AidingStatus::kGated;
+    if (record.status != AidingStatus::kAccepted) return record;
+    P_ = P_now;
+    sums_ = TransitionSums();
+    innovation.apply(x_, P_, m, considered_);
+    return record;
+  }
+
+  [[nodiscard]] const NavState& state() const { return x_; }
+  [[nodiscard]] ErrorMatrix covariance() const;  ///< at the state's epoch
+  [[nodiscard]] const Motion& motion() const { return motion_; }
+  [[nodiscard]] const InertialStep& last_step() const { return last_; }
+  [[nodiscard]] EarthModel& earth() { return earth_; }
+  [[nodiscard]] const EarthModel& earth() const { return earth_; }
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    earth_.serialise(a);
+    x_.serialise(a);
+    sums_.serialise(a);
+    last_.serialise(a);
+    a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size);
+  }
+
+ private:
+  void flush();
+
+  GnssInsConfig config_;
+  EarthModel earth_;
+  NavState x_;
+  ErrorMatrix P_ = ErrorMatrix::Identity();
+  TransitionSums sums_;
+  InertialStep last_;
+  Motion motion_;
+  StateRange considered_;
+};
+
+}  // namespace roadfix
