@@ -9,6 +9,7 @@ namespace {
 constexpr double kLargestDelay_s = 2.0;
 constexpr double kDelayStep_s = 0.05;
 constexpr double kDelayPrecision_s = 1e-4;
+constexpr int64_t kPathInterval_us = 100'000;
 
 /// Whether the reference may be scored at a time: both its neighbours may.
 class ScoreMask {
@@ -98,9 +99,9 @@ Alignment default_alignment(const EstimateInput& estimate) {
   return estimate.local_frame ? Alignment::kYaw : Alignment::kNone;
 }
 
-void take_to_reference_point(EstimateInput& estimate, const DriveFacts& facts, const EvaluationOptions& options) {
-  if (facts.reference.of != ReferenceOf::kAntenna || !estimate.trajectory.has_attitude) return;
-  for (Odometry& pose : estimate.trajectory.poses) pose = at_lever_arm(pose, options.p_vehicle_antenna);
+void take_to_reference_point(EstimateInput& estimate) {
+  if (!estimate.trajectory.has_attitude || estimate.lever_arm.isZero(0.0)) return;
+  for (Odometry& pose : estimate.trajectory.poses) pose = at_lever_arm(pose, estimate.lever_arm);
 }
 
 void measure_pairs(ChannelReport& report, const ReferenceKind& kind, const EvaluationOptions& options) {
@@ -127,16 +128,28 @@ void measure_pairs(ChannelReport& report, const ReferenceKind& kind, const Evalu
 }
 
 void measure_outages(ChannelReport& report, const Reference& reference, const DriveFacts& facts,
-                     const Trajectory& estimate, const ReferenceKind& kind) {
-  Trajectory aligned = estimate;
-  const auto delay_us = static_cast<int64_t>(std::llround(report.delay_s * 1e6));
-  for (Odometry& pose : aligned.poses) {
-    pose = transformed(report.similarity, pose);
-    pose.t_us += delay_us;
-  }
+                     const Trajectory& aligned, const ReferenceKind& kind) {
   report.outages = outage_errors(aligned, reference.trajectory, facts.outages, kind);
   report.tse_m = transition_stability(report.errors, facts.outages);
   report.rct = reconvergence(report.errors, facts.outages);
+}
+
+/// The estimate in the reference's frame and time.
+void align_in_place(Trajectory& trajectory, const Similarity& S, double delay_s) {
+  const auto delay_us = static_cast<int64_t>(std::llround(delay_s * 1e6));
+  for (Odometry& pose : trajectory.poses) {
+    pose = transformed(S, pose);
+    pose.t_us += delay_us;
+  }
+}
+
+std::vector<PathPoint> thinned_path(const Trajectory& trajectory) {
+  std::vector<PathPoint> path;
+  for (const Odometry& pose : trajectory.poses) {
+    if (!path.empty() && pose.t_us - path.back().t_us < kPathInterval_us) continue;
+    path.push_back({pose.t_us, pose.T_frame_vehicle.p, pose.validity});
+  }
+  return path;
 }
 
 }  // namespace
@@ -161,7 +174,7 @@ ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& fac
   std::erase_if(estimate.modes, [&](const ModeSample& m) { return m.t_us < begin_us || m.t_us > end_us; });
   report.modes = mode_accuracy(estimate.modes, reference.trajectory, options.turn_threshold);
 
-  take_to_reference_point(estimate, facts, options);
+  take_to_reference_point(estimate);
   if (options.fit_delay) report.delay_s = fitted_delay(reference, facts, estimate.trajectory, report.alignment);
   report.scored = scored_pairs(reference, facts, estimate.trajectory, report.delay_s);
   for (const Alignment alignment : {Alignment::kNone, Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}) {
@@ -178,7 +191,9 @@ ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& fac
   measure_pairs(report, kind, options);
   report.honesty = honesty(report.scored, kind, facts.reference.sigma_m);
   report.sigmas = sigma_samples(report.scored, kind, facts.reference.sigma_m);
+  align_in_place(estimate.trajectory, report.similarity, report.delay_s);
   measure_outages(report, reference, facts, estimate.trajectory, kind);
+  report.path = thinned_path(estimate.trajectory);
   return report;
 }
 

@@ -30,16 +30,16 @@ struct Reference {
 struct EstimateInput {
   std::string channel;
   Trajectory trajectory;
-  bool local_frame = false;       ///< its own frame: absolute errors mean nothing without an alignment
-  bool scale_unknown = false;     ///< lengths up to one factor
-  std::vector<double> latencies;  ///< s, from the time of validity to the time it was logged
-  std::vector<ModeSample> modes;  ///< of the fusion, else empty
+  bool local_frame = false;    ///< its own frame: absolute errors mean nothing without an alignment
+  bool scale_unknown = false;  ///< lengths up to one factor
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< m, vehicle axes: from its point to the reference's
+  std::vector<double> latencies;                        ///< s, from the time of validity to the time it was logged
+  std::vector<ModeSample> modes;                        ///< of the fusion, else empty
 };
 
 struct EvaluationOptions {
   std::optional<Alignment> alignment;  ///< none: by the estimate's frame (ENU: none; own: yaw; no scale: sim3)
   bool fit_delay = false;              ///< the reference's constant latency is fitted first, within +-2 s
-  Eigen::Vector3d p_vehicle_antenna = Eigen::Vector3d::Zero();   ///< for references of the antenna
   double turn_threshold = 3.0 * 3.14159265358979323846 / 180.0;  ///< rad/s, of MPA
   int rpe_stride = 100;                                          ///< samples, paper C
 };
@@ -50,6 +50,13 @@ struct AlignedAte {
   double mean = 0.0;             ///< m, as paper C
   double horizontal_rmse = 0.0;  ///< m
   double scale = 1.0;
+};
+
+/// A point of the whole estimate after alignment, scored or not.
+struct PathPoint {
+  int64_t t_us = 0;
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+  Validity validity = Validity::kInvalid;
 };
 
 struct ChannelReport {
@@ -81,6 +88,7 @@ struct ChannelReport {
   std::vector<PosePair> scored;  ///< after alignment
   std::vector<PoseError> errors;
   std::vector<SigmaSample> sigmas;
+  std::vector<PathPoint> path;  ///< at most ten points a second
 };
 
 /// The time that counts: from skip_s after the first fix to the end of the reference.

@@ -8,6 +8,8 @@ class App;
 namespace roadfix {
 
 void add_doctor_command(CLI::App& app);
+void add_evaluate_command(CLI::App& app);
+void add_export_command(CLI::App& app);
 void add_import_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_run_command(CLI::App& app);

@@ -18,6 +18,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Roadfix: localization for road vehicles, replayable to the bit", "roadfix"};
   app.require_subcommand(1);
   roadfix::add_doctor_command(app);
+  roadfix::add_evaluate_command(app);
+  roadfix::add_export_command(app);
   roadfix::add_import_command(app);
   roadfix::add_replay_command(app);
   roadfix::add_run_command(app);

@@ -96,11 +96,10 @@ TEST_CASE("the antenna's reference is compared with the antenna") {
   reference.trajectory.has_attitude = reference.trajectory.has_velocity = false;
   DriveFacts facts = exact_facts();
   facts.reference = {ReferenceOf::kAntenna, false, false, true, 0.0};
-  const auto estimate = estimate_of(eight_trajectory(0.0, 200.0, 0.1));
-  EvaluationOptions options;
-  CHECK(evaluate_channel(reference, facts, estimate, options).axes.norm.rms == Approx(lever_arm.norm()));
-  options.p_vehicle_antenna = lever_arm;
-  CHECK(evaluate_channel(reference, facts, estimate, options).axes.norm.max < 1e-9);
+  auto estimate = estimate_of(eight_trajectory(0.0, 200.0, 0.1));
+  CHECK(evaluate_channel(reference, facts, estimate, {}).axes.norm.rms == Approx(lever_arm.norm()));
+  estimate.lever_arm = lever_arm;
+  CHECK(evaluate_channel(reference, facts, estimate, {}).axes.norm.max < 1e-9);
 }
 
 TEST_CASE("an estimate in its own frame is aligned by yaw and one without scale by Sim3") {

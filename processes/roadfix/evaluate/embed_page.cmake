@@ -1,0 +1,11 @@
+# Writes OUT, a C++ source with the page's parts (HTML, CSS, JavaScript) as texts; page_parts.h declares them.
+set(CODE "#include \"roadfix/evaluate/page_parts.h\"\n\nnamespace roadfix {\n\n")
+foreach(PART html css js)
+  file(READ ${FOLDER}/page.${PART} CONTENT)
+  string(TOUPPER ${PART} NAME)
+  string(SUBSTRING ${NAME} 0 1 FIRST)
+  string(SUBSTRING ${PART} 1 -1 REST)
+  string(APPEND CODE "const char* const kPage${FIRST}${REST} = R\"PAGEPART(${CONTENT})PAGEPART\";\n\n")
+endforeach()
+string(APPEND CODE "}  // namespace roadfix\n")
+file(WRITE ${OUT} "${CODE}")

@@ -1,0 +1,255 @@
+#include "roadfix/evaluate/evaluation_log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bus/log_reader.h"
+#include "bus/message.h"
+#include "bus/schema.h"
+#include "config/config.h"
+#include "geodesy/enu_anchor.h"
+#include "geometry/frames.h"
+#include "roadfix/config_t.hpp"
+#include "roadfix/fusion_state_t.hpp"
+
+namespace roadfix {
+namespace {
+
+constexpr const char* kReferenceChannel = "REFERENCE";
+constexpr const char* kTurnMode = "constant_turn";
+
+Validity validity_of(int8_t value) {
+  if (value == pose_t::VALIDITY_VALID) return Validity::kValid;
+  return value == pose_t::VALIDITY_COASTING ? Validity::kCoasting : Validity::kInvalid;
+}
+
+Odometry odometry_of(const pose_t& m) {
+  Odometry pose;
+  pose.t_us = m.utime;
+  pose.T_frame_vehicle.p = Eigen::Map<const Eigen::Vector3d>(m.position_m);
+  pose.T_frame_vehicle.q = Eigen::Quaterniond(m.q_wxyz[0], m.q_wxyz[1], m.q_wxyz[2], m.q_wxyz[3]).normalized();
+  pose.velocity = Eigen::Map<const Eigen::Vector3d>(m.velocity_mps);
+  pose.angular_rate = Eigen::Map<const Eigen::Vector3d>(m.angular_rate_radps);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) pose.cov_pose(i, j) = m.cov_pose_m2_rad2[i][j];
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) pose.cov_velocity(i, j) = m.cov_velocity_m2ps2[i][j];
+  }
+  pose.validity = validity_of(m.validity);
+  return pose;
+}
+
+bool finite(const Odometry& pose) {
+  return pose.T_frame_vehicle.p.allFinite() && pose.T_frame_vehicle.q.coeffs().allFinite();
+}
+
+/// Coordinates of one ENU frame in another, exact at any distance.
+SE3 T_to_from(const Geodetic& to, const Geodetic& from) {
+  const EnuAnchor a(to);
+  const EnuAnchor b(from);
+  return {Eigen::Quaterniond(Eigen::Matrix3d(a.R_ecef_enu().transpose() * b.R_ecef_enu())).normalized(),
+          a.R_ecef_enu().transpose() * (b.p_ecef_enu() - a.p_ecef_enu())};
+}
+
+bool same(const Geodetic& a, const Geodetic& b) {
+  return a.latitude == b.latitude && a.longitude == b.longitude && a.height == b.height;
+}
+
+void transform(const SE3& T, Odometry& pose) { pose = transformed({1.0, T}, pose); }
+
+/// Collects one channel; poses of a frame other than the last one's are dropped when it is done.
+class StreamBuilder {
+ public:
+  void add(const pose_t& m, int64_t log_time_us) {
+    Odometry pose = odometry_of(m);
+    if (!finite(pose)) pose.validity = Validity::kInvalid;
+    const bool local_frame = m.frame == pose_t::FRAME_LOCAL;
+    if (!local_frame)
+      to_first_anchor({m.anchor_lat_deg * kDegree, m.anchor_lon_deg * kDegree, m.anchor_height_m}, pose);
+    stream_.scale_unknown = m.scale == pose_t::SCALE_UNKNOWN;
+    stream_.local_frame = local_frame;
+    stream_.origin = m.origin;
+    if (!stream_.trajectory.poses.empty() && pose.t_us <= stream_.trajectory.poses.back().t_us) {
+      ++stream_.backward;
+      return;
+    }
+    stream_.trajectory.poses.push_back(pose);
+    stream_.reasons.push_back(m.reason);
+    stream_.latencies.push_back(static_cast<double>(log_time_us - m.utime) * 1e-6);
+    local_.push_back(local_frame);
+  }
+
+  PoseStream take() {
+    auto& poses = stream_.trajectory.poses;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      if (local_[i] != stream_.local_frame) continue;
+      poses[kept] = poses[i];
+      stream_.reasons[kept] = stream_.reasons[i];
+      stream_.latencies[kept++] = stream_.latencies[i];
+    }
+    stream_.other_frame = static_cast<int>(poses.size() - kept);
+    poses.resize(kept);
+    stream_.reasons.resize(kept);
+    stream_.latencies.resize(kept);
+    // A replay stamps each event with its message's own time: there is no latency to tell.
+    if (std::all_of(stream_.latencies.begin(), stream_.latencies.end(), [](double l) { return l == 0.0; })) {
+      stream_.latencies.clear();
+    }
+    return std::move(stream_);
+  }
+
+ private:
+  void to_first_anchor(const Geodetic& anchor, Odometry& pose) {
+    if (!stream_.anchor) stream_.anchor = last_anchor_ = anchor;
+    if (same(anchor, *stream_.anchor)) return;
+    if (!same(anchor, last_anchor_)) T_first_last_ = T_to_from(*stream_.anchor, last_anchor_ = anchor);
+    transform(T_first_last_, pose);
+  }
+
+  PoseStream stream_;
+  std::vector<bool> local_;
+  Geodetic last_anchor_;
+  SE3 T_first_last_;
+};
+
+std::optional<ModeSample> mode_of(const fusion_state_t& state) {
+  for (int i = 0; i < state.num_modes; ++i) {
+    const auto mode = static_cast<std::size_t>(i);
+    if (state.mode_name[mode] == kTurnMode) return ModeSample{state.utime, state.mode_probability[mode]};
+  }
+  return std::nullopt;
+}
+
+void read_facts(const config_t& config, const std::filesystem::path& path, EvaluationLog& log) {
+  log.facts = parse_config<DriveFacts>(config.config_yaml, path.string() + " (CONFIG_DRIVE)");
+  if (!config.calibration_yaml.empty()) {
+    log.calibration = parse_calibration(config.calibration_yaml, path.string() + " (CONFIG_DRIVE calibration)");
+  }
+  log.has_facts = true;
+}
+
+/// The checks of the three types that are read here.
+struct Checks {
+  MessageCheck pose = Schema::built_in().check_of("pose_t");
+  MessageCheck config = Schema::built_in().check_of("config_t");
+  MessageCheck fusion = Schema::built_in().check_of("fusion_state_t");
+};
+
+/// What the log holds so far; add() says whether the event was a message of its channel's type.
+class LogCollector {
+ public:
+  LogCollector(const std::filesystem::path& path, const std::set<std::string>& channels)
+      : path_(path), channels_(channels) {}
+
+  bool add(const LogEvent& event) {
+    const std::string channel(event.channel);
+    if (is_pose(channel)) return add_pose(channel, event);
+    if (channel == "CONFIG_DRIVE") {
+      if (checks_.config(event.data) != CheckResult::kOk) return false;
+      read_facts(decode<config_t>(event.data), path_, log_);
+    } else if (channel == "FUSION_STATE") {
+      if (checks_.fusion(event.data) != CheckResult::kOk) return false;
+      if (const auto mode = mode_of(decode<fusion_state_t>(event.data))) log_.modes.push_back(*mode);
+    }
+    return true;
+  }
+
+  EvaluationLog take() {
+    for (auto& [channel, builder] : builders_) log_.poses.emplace(channel, builder.take());
+    return std::move(log_);
+  }
+
+ private:
+  [[nodiscard]] bool is_pose(const std::string& channel) const {
+    if (channel == kReferenceChannel) return true;
+    return channels_.empty() ? channel.starts_with("POSE_") : channels_.contains(channel);
+  }
+
+  bool add_pose(const std::string& channel, const LogEvent& event) {
+    if (checks_.pose(event.data) != CheckResult::kOk) return false;
+    builders_[channel].add(decode<pose_t>(event.data), event.timestamp_us);
+    return true;
+  }
+
+  const std::filesystem::path& path_;
+  const std::set<std::string>& channels_;
+  Checks checks_;
+  EvaluationLog log_;
+  std::map<std::string, StreamBuilder> builders_;
+};
+
+/// The point of the vehicle in body axes, where the calibration tells.
+std::optional<Eigen::Vector3d> point_of(int8_t origin, const Calibration& calibration) {
+  const bool imu_body = calibration.body_origin.value_or(BodyOrigin::kImu) == BodyOrigin::kImu;
+  if (origin == pose_t::ORIGIN_IMU && imu_body) return Eigen::Vector3d::Zero();
+  if (origin == pose_t::ORIGIN_REAR_AXLE && !imu_body) return Eigen::Vector3d::Zero();
+  if (origin == pose_t::ORIGIN_ANTENNA && calibration.sensors.gnss) return calibration.sensors.gnss->lever_arm;
+  if (origin == pose_t::ORIGIN_CAMERA && calibration.sensors.camera_left && calibration.sensors.camera_left->mounting) {
+    return calibration.sensors.camera_left->mounting->p;
+  }
+  return std::nullopt;
+}
+
+const char* origin_name(int8_t origin) {
+  static constexpr const char* kNames[] = {"imu", "rear axle", "antenna", "camera"};
+  return origin >= 0 && origin < 4 ? kNames[origin] : "unknown point";
+}
+
+}  // namespace
+
+EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels) {
+  LogReader reader(path);
+  LogCollector collector(path, channels);
+  int undecodable = 0;
+  while (const auto event = reader.next()) undecodable += collector.add(*event) ? 0 : 1;
+  EvaluationLog log = collector.take();
+  if (undecodable > 0) {
+    log.notes.push_back(fmt::format("{} messages of {} could not be decoded", undecodable, path.string()));
+  }
+  if (!reader.damage().empty()) {
+    log.notes.push_back(
+        fmt::format("{} is damaged in {} places; what is intact was used", path.string(), reader.damage().size()));
+  }
+  return log;
+}
+
+void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {
+  if (!stream.anchor || stream.local_frame || same(*stream.anchor, anchor)) return;
+  const SE3 T = T_to_from(anchor, *stream.anchor);
+  for (Odometry& pose : stream.trajectory.poses) transform(T, pose);
+  stream.anchor = anchor;
+}
+
+Reference reference_of(const EvaluationLog& log, const std::filesystem::path& path) {
+  const auto found = log.poses.find(kReferenceChannel);
+  if (found == log.poses.end() || found->second.trajectory.poses.empty()) {
+    throw EvaluationLogError(path.string() +
+                             ": no poses on channel REFERENCE; give a log that has them with --reference");
+  }
+  Reference reference{found->second.trajectory, {}};
+  reference.trajectory.has_attitude = log.facts.reference.attitude;
+  reference.trajectory.has_velocity = log.facts.reference.velocity;
+  for (std::size_t i = 0; i < reference.trajectory.poses.size(); ++i) {
+    reference.flags.push_back({.may_score = reference.trajectory.poses[i].validity == Validity::kValid,
+                               .withheld = found->second.reasons[i] == kWithheld});
+  }
+  return reference;
+}
+
+Eigen::Vector3d lever_arm_between(int8_t from_origin, int8_t to_origin, const Calibration& calibration,
+                                  std::vector<std::string>& notes) {
+  if (from_origin == to_origin) return Eigen::Vector3d::Zero();
+  const auto from = point_of(from_origin, calibration);
+  const auto to = point_of(to_origin, calibration);
+  if (from && to) return *to - *from;
+  const std::string note =
+      fmt::format("the calibration does not tell where the {} is seen from the {}: compared as if they were one point",
+                  origin_name(to_origin), origin_name(from_origin));
+  if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+  return Eigen::Vector3d::Zero();
+}
+
+}  // namespace roadfix

@@ -1,0 +1,58 @@
+/// What `roadfix evaluate` and `roadfix export` take from a log: poses, the reference and the facts of the drive, all
+/// in one ENU frame.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "config/calibration.h"
+#include "evaluation/evaluate.h"
+#include "roadfix/pose_t.hpp"
+
+namespace roadfix {
+
+/// A log without what was asked of it, or with bytes that are no message; the text names the file.
+struct EvaluationLogError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// The poses of one channel as they lie in the log.
+struct PoseStream {
+  Trajectory trajectory;             ///< ENU poses are in `anchor`'s frame
+  std::vector<std::string> reasons;  ///< pose_t::reason, one per pose
+  std::vector<double> latencies;     ///< s, log time minus utime
+  std::optional<Geodetic> anchor;    ///< of its first ENU pose; nothing for a local frame
+  bool local_frame = false;
+  bool scale_unknown = false;
+  int8_t origin = 0;    ///< pose_t::ORIGIN_*
+  int other_frame = 0;  ///< poses left out: in another frame than the last one
+  int backward = 0;     ///< poses left out: not later than the one before
+};
+
+struct EvaluationLog {
+  DriveFacts facts;
+  bool has_facts = false;
+  Calibration calibration;
+  std::map<std::string, PoseStream> poses;  ///< REFERENCE among them
+  std::vector<ModeSample> modes;
+  std::vector<std::string> notes;  ///< what a reader of the figures must know: damage, missing facts
+};
+
+/// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE and FUSION_STATE.
+EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels);
+
+/// The stream in another ENU frame; a local stream stays as it is.
+void move_to_anchor(PoseStream& stream, const Geodetic& anchor);
+
+/// The reference of a log, with what may be scored of it. Throws where there is none.
+Reference reference_of(const EvaluationLog& log, const std::filesystem::path& path);
+
+/// From the stream's point of the vehicle to the reference's, vehicle axes; a note where the calibration does not tell.
+Eigen::Vector3d lever_arm_between(int8_t from_origin, int8_t to_origin, const Calibration& calibration,
+                                  std::vector<std::string>& notes);
+
+}  // namespace roadfix

@@ -1,0 +1,165 @@
+#include <fmt/format.h>
+
+#include "geometry/frames.h"
+#include "roadfix/evaluate/report.h"
+
+namespace roadfix {
+namespace {
+
+/// Four digits that count, without an exponent where a person can read it.
+std::string number(double value) {
+  const double size = std::abs(value);
+  if (size != 0.0 && (size < 1e-4 || size >= 1e6)) return fmt::format("{:.2e}", value);
+  const int decimals = size < 1.0 ? 4 : size < 10.0 ? 3 : size < 100.0 ? 2 : 1;
+  return fmt::format("{:.{}f}", value, decimals);
+}
+
+std::string percent(double share) { return fmt::format("{:.2f} %", 100.0 * share); }
+
+std::string row(const std::string& name, const Summary& s, double unit = 1.0) {
+  return fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", name, number(s.rms / unit), number(s.median / unit),
+                     number(s.p95 / unit), number(s.max / unit));
+}
+
+std::string axes_rows(const AxisErrors& axes) {
+  std::string text = fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "error", "RMSE", "median", "95 %", "max");
+  text += row("horizontal m", axes.horizontal);
+  text += row("longitudinal m", axes.longitudinal);
+  text += row("lateral m", axes.lateral);
+  text += row("vertical m", axes.vertical);
+  if (axes.roll) text += row("roll deg", *axes.roll, kDegree);
+  if (axes.pitch) text += row("pitch deg", *axes.pitch, kDegree);
+  if (axes.yaw) text += row("yaw deg", *axes.yaw, kDegree);
+  if (axes.speed) text += row("velocity m/s", *axes.speed);
+  return text;
+}
+
+std::string honesty_row(const std::string& name, const HonestyRow& r, double unit = 1.0) {
+  std::string text =
+      fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}", name, number(r.nees_per_dof), number(r.median_error / unit),
+                  number(r.median_sigma / unit), percent(r.within_3sigma));
+  if (r.unusable > 0) text += fmt::format("   {} unusable", r.unusable);
+  return text + "\n";
+}
+
+std::string honesty_rows(const Honesty& h) {
+  std::string text =
+      fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "covariance", "NEES/dof", "error", "sigma", "in 3 s");
+  text += honesty_row("horizontal m", h.horizontal);
+  text += honesty_row("position m", h.position);
+  if (h.attitude) text += honesty_row("attitude deg", *h.attitude, kDegree);
+  if (h.velocity) text += honesty_row("velocity m/s", *h.velocity);
+  if (h.pose) text += honesty_row("pose", *h.pose);
+  return text;
+}
+
+std::string trajectory_lines(const ChannelReport& c) {
+  std::string text =
+      fmt::format("  ATE {} m RMSE (evo), {} m mean norm (paper C)", number(c.ate_rmse), number(c.ate_mean));
+  text += fmt::format("; after alignment, RMSE:");
+  for (const AlignedAte& a : c.ate_by_alignment) {
+    if (a.alignment != Alignment::kNone) text += fmt::format(" {} {}", name_of(a.alignment), number(a.rmse));
+  }
+  text += "\n";
+  if (c.rpe_mean) text += fmt::format("  RPE {} m mean over 100 samples (paper C)\n", number(*c.rpe_mean));
+  if (c.rpe_rmse) {
+    text += fmt::format("  RPE {} m, {} deg RMSE over {} samples (evo)\n", number(c.rpe_rmse->translation_rmse),
+                        number(c.rpe_rmse->rotation_rmse / kDegree), c.rpe_rmse->delta);
+  }
+  if (c.kitti) {
+    text += fmt::format("  drift {} %, {} deg/100 m (KITTI, {} segments)\n", number(c.kitti->translation_percent),
+                        number(c.kitti->rotation_deg_per_100m), c.kitti->segments);
+  }
+  return text;
+}
+
+std::string outage_lines(const ChannelReport& c) {
+  std::string text;
+  const OutageErrors& o = c.outages;
+  if (!o.each.empty() || o.missing > 0) {
+    text += fmt::format("  {} outages, horizontal error at the end: RMS {} m, median {}, max {}; {} % of {} m (RMS)",
+                        o.each.size(), number(o.horizontal.rms), number(o.horizontal.median), number(o.horizontal.max),
+                        number(o.rms_percent), number(o.mean_distance_m));
+    text += o.missing > 0 ? fmt::format("; {} without an estimate at the end\n", o.missing) : "\n";
+  }
+  if (c.tse_m) text += fmt::format("  TSE {} m", number(*c.tse_m));
+  if (c.rct) {
+    text += fmt::format("{}RCT {} s to below {} m", c.tse_m ? ", " : "  ", number(c.rct->mean_s),
+                        number(c.rct->threshold_m));
+    if (c.rct->never > 0) text += fmt::format(" ({} of {} returns never)", c.rct->never, c.rct->returns);
+  }
+  if (c.tse_m || c.rct) text += " (paper C)\n";
+  if (c.modes) {
+    text += fmt::format("  MPA {:.1f} % (balanced {:.1f} %, always CA {:.1f} %) at {:.1f} deg/s\n", c.modes->percent,
+                        c.modes->balanced_percent, c.modes->always_straight_percent, c.modes->threshold / kDegree);
+  }
+  return text;
+}
+
+std::string channel_text(const ChannelReport& c) {
+  std::string text = fmt::format("{}  alignment: {}", c.channel, name_of(c.alignment));
+  if (c.alignment == Alignment::kSim3) text += fmt::format(", scale {}", number(c.similarity.scale));
+  if (c.delay_s != 0.0) text += fmt::format(", reference {:.3f} s late (fitted)", c.delay_s);
+  text += fmt::format("\n  {} scored of {} poses, {:.0f} s, {:.0f} m\n", c.pairs, c.poses, c.duration_s, c.distance_m);
+  if (c.pairs > 0) text += axes_rows(c.axes) + honesty_rows(c.honesty) + trajectory_lines(c);
+  text += outage_lines(c);
+  const Availability& a = c.availability;
+  text += fmt::format("  valid {}, coasting {}, invalid {}, silent {} of the time\n", percent(a.valid),
+                      percent(a.coasting), percent(a.invalid), percent(a.silent));
+  if (c.latency)
+    text += fmt::format("  latency {} s median, {} s max\n", number(c.latency->median), number(c.latency->max));
+  return text + "\n";
+}
+
+std::string head(const EvaluationReport& report) {
+  const DriveFacts& f = report.facts;
+  std::string text =
+      fmt::format("{}: scored {} s after the first fix", f.name.empty() ? "drive" : f.name, f.score.skip_s);
+  if (f.reference.from_fixes) text += f.score_withheld_only ? ", against the fixes withheld" : ", against the fixes";
+  if (f.reference.sigma_m > 0.0) text += fmt::format(" (sigma {} m)", f.reference.sigma_m);
+  text += "\n";
+  for (const std::string& note : report.notes) text += "note: " + note + "\n";
+  return text + "\n";
+}
+
+std::string overview(const EvaluationReport& report) {
+  std::string text = fmt::format("{:<14}{:>9}{:>13}{:>11}{:>11}{:>11}{:>11}{:>10}\n", "channel", "aligned",
+                                 "horizontal m", "95 % m", "vertical m", "yaw deg", "in 3 s", "usable");
+  for (const ChannelReport& c : report.channels) {
+    const bool any = c.pairs > 0;
+    text += fmt::format("{:<14}{:>9}{:>13}{:>11}{:>11}{:>11}{:>11}{:>10}\n", c.channel, name_of(c.alignment),
+                        any ? number(c.axes.horizontal.rms) : "-", any ? number(c.axes.horizontal.p95) : "-",
+                        any ? number(c.axes.vertical.rms) : "-",
+                        any && c.axes.yaw ? number(c.axes.yaw->rms / kDegree) : "-",
+                        any ? percent(c.honesty.position.within_3sigma) : "-",
+                        fmt::format("{:.1f} %", 100.0 * (c.availability.valid + c.availability.coasting)));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string report_table(const EvaluationReport& report) {
+  std::string text = head(report);
+  for (const ChannelReport& c : report.channels) text += channel_text(c);
+  return text + overview(report);
+}
+
+std::string errors_csv(const ChannelReport& channel) {
+  std::string text =
+      "utime_us,longitudinal_m,lateral_m,vertical_m,roll_deg,pitch_deg,yaw_deg,std_longitudinal_m,std_lateral_m,"
+      "std_vertical_m,std_roll_deg,std_pitch_deg,std_yaw_deg\n";
+  for (std::size_t i = 0; i < channel.errors.size(); ++i) {
+    const PoseError& e = channel.errors[i];
+    const SigmaSample& s = channel.sigmas[i];
+    text += fmt::format("{}", e.t_us);
+    for (int k = 0; k < 3; ++k) text += fmt::format(",{:.6f}", e.position_vehicle(k));
+    for (int k = 0; k < 3; ++k) text += fmt::format(",{:.6f}", e.angles(k) / kDegree);
+    for (int k = 0; k < 3; ++k) text += fmt::format(",{:.6f}", s.position_vehicle(k));
+    for (int k = 0; k < 3; ++k) text += fmt::format(",{:.6f}", s.angles(k) / kDegree);
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,142 @@
+// roadfix evaluate: how good is what a log's estimates say?
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "geometry/frames.h"
+#include "roadfix/commands.h"
+#include "roadfix/evaluate/evaluation_log.h"
+#include "roadfix/evaluate/report.h"
+
+namespace roadfix {
+namespace {
+
+struct Options {
+  std::filesystem::path log;
+  std::filesystem::path reference;
+  std::vector<std::string> channels;
+  std::string align = "auto";
+  bool fit_delay = false;
+  double turn_degps = 3.0;
+  std::filesystem::path out;
+  std::filesystem::path json;
+};
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw EvaluationLogError(path.string() + ": cannot be written");
+}
+
+EvaluationOptions evaluation_options(const Options& options) {
+  EvaluationOptions out;
+  out.fit_delay = options.fit_delay;
+  out.turn_threshold = options.turn_degps * kDegree;
+  if (options.align == "none") out.alignment = Alignment::kNone;
+  if (options.align == "yaw") out.alignment = Alignment::kYaw;
+  if (options.align == "se3") out.alignment = Alignment::kSe3;
+  if (options.align == "sim3") out.alignment = Alignment::kSim3;
+  return out;
+}
+
+/// The channels asked for, each of which must be there; all estimates where none was named.
+std::vector<std::string> chosen_channels(const Options& options, const EvaluationLog& log) {
+  std::vector<std::string> chosen = options.channels;
+  if (chosen.empty()) {
+    for (const auto& [channel, stream] : log.poses) {
+      if (channel != "REFERENCE") chosen.push_back(channel);
+    }
+  }
+  if (chosen.empty()) throw EvaluationLogError(options.log.string() + ": no POSE_* channel to evaluate");
+  for (const std::string& channel : chosen) {
+    if (!log.poses.contains(channel))
+      throw EvaluationLogError(options.log.string() + ": no poses on channel " + channel);
+  }
+  return chosen;
+}
+
+EstimateInput estimate_input(const std::string& channel, PoseStream stream, const PoseStream& reference,
+                             const EvaluationLog& truth, EvaluationReport& report) {
+  if (reference.anchor) move_to_anchor(stream, *reference.anchor);
+  EstimateInput input;
+  input.channel = channel;
+  input.local_frame = stream.local_frame || reference.local_frame;
+  input.scale_unknown = stream.scale_unknown;
+  input.lever_arm = lever_arm_between(stream.origin, reference.origin, truth.calibration, report.notes);
+  input.latencies = std::move(stream.latencies);
+  input.trajectory = std::move(stream.trajectory);
+  if (stream.backward + stream.other_frame > 0) {
+    report.notes.push_back(
+        fmt::format("{}: {} poses that do not move forward in time and {} in another frame are left out", channel,
+                    stream.backward, stream.other_frame));
+  }
+  return input;
+}
+
+EvaluationReport evaluate(const Options& options) {
+  const std::filesystem::path& truth_path = options.reference.empty() ? options.log : options.reference;
+  EvaluationLog log = read_evaluation_log(options.log, {options.channels.begin(), options.channels.end()});
+  const EvaluationLog other =
+      options.reference.empty() ? EvaluationLog{} : read_evaluation_log(truth_path, {"REFERENCE"});
+  const EvaluationLog& truth = options.reference.empty() ? log : other;
+  EvaluationReport report;
+  report.facts = truth.facts;
+  report.notes = log.notes;
+  if (!options.reference.empty()) report.notes.insert(report.notes.end(), other.notes.begin(), other.notes.end());
+  report.reference = reference_of(truth, truth_path);
+  if (!truth.has_facts) {
+    report.notes.push_back(truth_path.string() + ": no CONFIG_DRIVE; the whole reference is scored");
+    report.facts.first_fix_us = report.reference.trajectory.poses.front().t_us;
+  }
+  const PoseStream& reference = truth.poses.at("REFERENCE");
+  for (const std::string& channel : chosen_channels(options, log)) {
+    EstimateInput input = estimate_input(channel, std::move(log.poses.at(channel)), reference, truth, report);
+    if (channel == "POSE_FUSED") input.modes = log.modes;
+    report.channels.push_back(
+        evaluate_channel(report.reference, report.facts, std::move(input), evaluation_options(options)));
+  }
+  return report;
+}
+
+void run(const Options& options) {
+  const EvaluationReport report = evaluate(options);
+  std::filesystem::path folder = options.out;
+  if (folder.empty()) folder = options.log.parent_path() / (options.log.stem().string() + "-report");
+  const std::string json = report_json(report).dump(2) + "\n";
+  write_text(folder / "figures.json", json);
+  if (!options.json.empty()) write_text(options.json, json);
+  for (const ChannelReport& c : report.channels) write_text(folder / (c.channel + "_errors.csv"), errors_csv(c));
+  write_text(folder / "report.html", report_page(report));
+  std::cout << report_table(report) << (folder / "report.html").string() << "\n";
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("evaluate", "Score the poses of a log against its reference: table, JSON, page");
+  command->add_option("log", options->log, "what a replay or a drive wrote")->required()->check(CLI::ExistingFile);
+  command
+      ->add_option("--reference", options->reference,
+                   "the log with REFERENCE and CONFIG_DRIVE, where it is another one")
+      ->check(CLI::ExistingFile);
+  command->add_option("--channel", options->channels, "what to score; every POSE_* channel where none is named");
+  command->add_option("--align", options->align, "auto: none for ENU, yaw for an own frame, sim3 without scale")
+      ->check(CLI::IsMember({"auto", "none", "yaw", "se3", "sim3"}))
+      ->capture_default_str();
+  command->add_flag("--fit-latency", options->fit_delay, "fit the reference's constant latency first, within 2 s");
+  command->add_option("--turn-degps", options->turn_degps, "yaw rate that counts as a turn (MPA)")
+      ->capture_default_str();
+  command->add_option("--out", options->out, "folder for the report; LOG-report where not given");
+  command->add_option("--json", options->json, "a copy of the figures");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace roadfix

@@ -1,0 +1,64 @@
+// roadfix export: a channel's poses for other tools.
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "evaluation/trajectory_formats.h"
+#include "roadfix/commands.h"
+#include "roadfix/evaluate/evaluation_log.h"
+
+namespace roadfix {
+namespace {
+
+struct Options {
+  std::filesystem::path log;
+  std::string channel = "POSE_FUSED";
+  std::string format = "tum";
+  std::filesystem::path out;
+};
+
+void write(std::ostream& out, const PoseStream& stream, const Options& options) {
+  if (options.format == "tum") {
+    write_tum(out, stream.trajectory);
+  } else if (options.format == "kitti") {
+    write_kitti(out, stream.trajectory);
+  } else if (options.format == "csv") {
+    write_csv(out, stream.trajectory, stream.local_frame ? std::nullopt : stream.anchor);
+  } else if (stream.anchor && !stream.local_frame) {
+    write_geojson(out, stream.trajectory, *stream.anchor, options.channel);
+  } else {
+    throw EvaluationLogError(options.log.string() + ": " + options.channel +
+                             " is in a frame of its own, without an ENU anchor: no GeoJSON");
+  }
+}
+
+void run(const Options& options) {
+  const EvaluationLog log = read_evaluation_log(options.log, {options.channel});
+  for (const std::string& note : log.notes) std::cerr << "roadfix export: " << note << "\n";
+  const auto stream = log.poses.find(options.channel);
+  if (stream == log.poses.end()) {
+    throw EvaluationLogError(options.log.string() + ": no poses on channel " + options.channel);
+  }
+  std::ofstream out(options.out, std::ios::binary);
+  write(out, stream->second, options);
+  out.close();
+  if (!out) throw EvaluationLogError(options.out.string() + ": cannot be written");
+  std::cout << options.out.string() << "\n";
+}
+
+}  // namespace
+
+void add_export_command(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("export", "Write a channel's poses as TUM, KITTI, CSV or GeoJSON");
+  command->add_option("log", options->log, "a log with poses")->required()->check(CLI::ExistingFile);
+  command->add_option("--channel", options->channel, "POSE_INS, POSE_FUSED, REFERENCE ...")->capture_default_str();
+  command->add_option("--format", options->format)
+      ->check(CLI::IsMember({"tum", "kitti", "csv", "geojson"}))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "the file to write")->required();
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace roadfix

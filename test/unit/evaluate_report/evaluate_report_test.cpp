@@ -1,0 +1,183 @@
+#include <catch2/catch.hpp>
+#include <fstream>
+
+#include "roadfix/evaluate/evaluation_log.h"
+#include "roadfix/evaluate/report.h"
+#include "unit/evaluate_report/small_log.h"
+
+namespace roadfix {
+namespace {
+
+using test::SmallLog;
+
+class Folder {
+ public:
+  explicit Folder(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / ("roadfix_" + name + "_" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+void keep(double, pose_t&) {}
+
+EvaluationReport evaluate_all(const std::filesystem::path& path) {
+  EvaluationLog log = read_evaluation_log(path, {});
+  EvaluationReport report{log.facts, reference_of(log, path), {}, log.notes};
+  for (auto& [channel, stream] : log.poses) {
+    if (channel == "REFERENCE") continue;
+    EstimateInput input;
+    input.channel = channel;
+    input.local_frame = stream.local_frame;
+    input.trajectory = stream.trajectory;
+    report.channels.push_back(evaluate_channel(report.reference, report.facts, input, {}));
+  }
+  return report;
+}
+
+TEST_CASE("a log is read back to the figures that were put in") {
+  const Folder folder("report");
+  const SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    small.write_estimate(writer, "POSE_INS", [](double, pose_t& m) { m.position_m[2] += 0.25; });
+    small.write_estimate(writer, "POSE_LOCAL", [](double, pose_t& m) { m.frame = pose_t::FRAME_LOCAL; });
+    writer.commit();
+  }
+  const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  REQUIRE(report.channels.size() == 2);
+  const auto json = report_json(report);
+  const auto& ins = json["channels"]["POSE_INS"];
+  CHECK(ins["errors"]["vertical_m"]["rmse"].get<double>() == Approx(0.25));
+  CHECK(ins["errors"]["horizontal_m"]["max"].get<double>() < 1e-6);
+  CHECK(ins["outages"]["count"] == 2);
+  CHECK(ins["outages"]["vertical_m"]["max"].get<double>() == Approx(0.25));
+  CHECK(ins["scored"] == 2301);
+  CHECK(json["channels"]["POSE_LOCAL"]["alignment"] == "yaw");
+  CHECK(json["drive"]["name"] == "small <drive>");
+  const std::string table = report_table(report);
+  CHECK(table.find("POSE_INS") != std::string::npos);
+  CHECK(table.find("0.2500") != std::string::npos);
+  const std::string page = report_page(report);
+  for (const char* key : {"@TITLE@", "@CSS@", "@TABLE@", "@JS@", "@PLOTS@", "@FIGURES@"}) {
+    CHECK(page.find(key) == std::string::npos);
+  }
+  CHECK(page.find("<h1>small &lt;drive></h1>") != std::string::npos);
+  CHECK(page.find("http://") == page.find("http://www.w3.org/2000/svg"));  // nothing to fetch
+  CHECK(page.find("https://") == std::string::npos);
+}
+
+TEST_CASE("an estimate in another ENU frame lands on the reference") {
+  const Folder folder("anchors");
+  const SmallLog small;
+  SmallLog far = small;
+  far.anchor = {small.anchor.latitude + 2e-4, small.anchor.longitude - 3e-4, small.anchor.height + 30.0};
+  const EnuAnchor here(small.anchor);
+  const EnuAnchor there(far.anchor);
+  const Eigen::Matrix3d R = there.R_ecef_enu().transpose() * here.R_ecef_enu();
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    far.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
+      const SE3 T = test::eight(t_s).T_frame_vehicle;
+      const Eigen::Vector3d p = there.enu(here.geodetic(T.p));
+      const Eigen::Quaterniond q(Eigen::Matrix3d(R * T.R()));
+      std::copy(p.data(), p.data() + 3, m.position_m);
+      const double wxyz[] = {q.w(), q.x(), q.y(), q.z()};
+      std::copy(wxyz, wxyz + 4, m.q_wxyz);
+    });
+    writer.commit();
+  }
+  EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  PoseStream& stream = log.poses.at("POSE_INS");
+  CHECK(stream.trajectory.poses[0].T_frame_vehicle.p.norm() > 1000.0);
+  move_to_anchor(stream, *log.poses.at("REFERENCE").anchor);
+  for (const PosePair& pair : associate(stream.trajectory, log.poses.at("REFERENCE").trajectory, true)) {
+    REQUIRE(local(pair.estimate.T_frame_vehicle, pair.reference.T_frame_vehicle).norm() < 1e-6);
+  }
+}
+
+TEST_CASE("lever arms come from the calibration, and a missing one is said") {
+  const Folder folder("levers");
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    SmallLog().write_drive(writer);
+    writer.commit();
+  }
+  const EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  std::vector<std::string> notes;
+  CHECK(lever_arm_between(pose_t::ORIGIN_IMU, pose_t::ORIGIN_ANTENNA, log.calibration, notes) ==
+        Eigen::Vector3d(1.0, 0.5, 1.5));
+  CHECK(notes.empty());
+  CHECK(lever_arm_between(pose_t::ORIGIN_IMU, pose_t::ORIGIN_REAR_AXLE, log.calibration, notes).isZero());
+  CHECK(notes.size() == 1);
+}
+
+TEST_CASE("a repeated stretch, a change of frame and bytes that are no message are left out and said") {
+  const Folder folder("broken");
+  const SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    small.write_estimate(writer, "POSE_VO", [](double t_s, pose_t& m) {
+      if (t_s < 10.0) m.frame = pose_t::FRAME_LOCAL;
+    });
+    small.write_estimate(writer, "POSE_VO", keep);
+    const std::vector<uint8_t> junk(200, 7);
+    writer.write("POSE_VO", test::kStart_us, junk);
+    writer.commit();
+  }
+  const EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  const PoseStream& stream = log.poses.at("POSE_VO");
+  CHECK(stream.backward == 5001);
+  CHECK(stream.other_frame == 200);
+  CHECK(stream.trajectory.poses.size() == 5001 - 200);
+  CHECK(stream.reasons.size() == stream.trajectory.poses.size());
+  REQUIRE(log.notes.size() == 1);
+  CHECK(log.notes[0].find("1 messages") != std::string::npos);
+}
+
+TEST_CASE("a log without a reference is an error that names the file") {
+  const Folder folder("no_reference");
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    SmallLog().write_estimate(writer, "POSE_INS", keep);
+    writer.commit();
+  }
+  const EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  CHECK_THROWS_WITH(reference_of(log, folder.file("out.lcm")),
+                    Catch::Contains("out.lcm") && Catch::Contains("REFERENCE"));
+}
+
+TEST_CASE("withheld and unscorable references are told by reason and validity") {
+  const Folder folder("flags");
+  SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    writer.commit();
+  }
+  {
+    LogWriter writer(folder.file("flagged.lcm"));
+    for (int i = 0; i < 10; ++i) {
+      pose_t m = test::pose_message(test::eight(0.1 * i), small.anchor);
+      if (i % 2 == 0) m.reason = kWithheld;
+      if (i == 3) m.validity = pose_t::VALIDITY_INVALID;
+      writer.write("REFERENCE", m.utime, encode(m));
+    }
+    writer.commit();
+  }
+  const Reference reference = reference_of(read_evaluation_log(folder.file("flagged.lcm"), {}), "flagged.lcm");
+  CHECK(reference.flags[2].withheld);
+  CHECK_FALSE(reference.flags[1].withheld);
+  CHECK_FALSE(reference.flags[3].may_score);
+  CHECK(reference.flags[4].may_score);
+}
+
+}  // namespace
+}  // namespace roadfix
