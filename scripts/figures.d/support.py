@@ -1,0 +1,117 @@
+"""What the measurements share: runs of the built programs, each done once however many rows use it."""
+import json
+import math
+import subprocess
+import time
+
+
+class Skipped(Exception):
+    """A row that cannot be measured here, with the reason."""
+
+
+def root_mean_square(values):
+    values = list(values)
+    return math.sqrt(sum(v * v for v in values) / len(values))
+
+
+class Runs:
+    """Imports, replays and evaluations under build/figures; results are kept for the length of this program."""
+
+    def __init__(self, root, deadline):
+        self.root = root
+        self.shared = root / ".." / "shared"
+        self.bin = root / "build" / "release" / "bin"
+        self.work = root / "build" / "figures"
+        self.deadline = deadline
+        self.known = {}
+
+    def once(self, key, function):
+        """function() on the first call with this key, its result on later ones."""
+        if key not in self.known:
+            self.known[key] = function()
+        return self.known[key]
+
+    def program(self, name):
+        path = self.bin / name
+        if not path.exists():
+            raise Skipped(f"build/release/bin/{name} is not built")
+        return path
+
+    def drive(self, name):
+        path = self.shared / "data" / name
+        if not path.exists():
+            raise Skipped(f"../shared/data/{name} is not here")
+        return path
+
+    def call(self, *command):
+        """Standard output of a program; Skipped with its last words where it fails or the time is up."""
+        left = self.deadline - time.monotonic()
+        if left <= 0:
+            raise Skipped("45 minutes are over")
+        words = [str(word) for word in command]
+        try:
+            done = subprocess.run(words, cwd=self.root, capture_output=True, text=True, timeout=left)
+        except subprocess.TimeoutExpired:
+            raise Skipped("45 minutes are over") from None
+        if done.returncode != 0:
+            last = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()[-1]
+            raise Skipped(f"{' '.join(words[:3])} ended with {done.returncode}: {last}")
+        return done.stdout
+
+    def roadfix(self, *arguments):
+        return self.call(self.program("roadfix"), *arguments)
+
+    def imported(self, drive, *flags):
+        """(log, vehicle folder) of a drive of ../shared/data imported with these flags."""
+
+        def run():
+            folder = self.folder(drive, *flags)
+            log, vehicle = folder / "drive.lcm", folder / "vehicle"
+            self.roadfix("import", self.drive(drive), "--out", log, "--vehicle", vehicle, "--overwrite", *flags)
+            return log, vehicle
+
+        return self.once(("import", drive, flags), run)
+
+    def folder(self, *words):
+        name = "_".join(str(word).lstrip("-").replace(",", "_") for word in words) or "run"
+        path = self.work / name
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def replayed(self, stages, drive, *flags):
+        """(output log, printed text) of the replay of an imported drive; the drive log is deleted afterwards."""
+
+        def run():
+            log, vehicle = self.imported(drive, *flags)
+            out = self.folder(drive, *flags) / "out.lcm"
+            text = self.roadfix("replay", log, "--stages", stages, "--config", vehicle, "--out", out)
+            return out, text
+
+        return self.once(("replay", stages, drive, flags), run)
+
+    def scored(self, channel, stages, drive, *flags, evaluate=()):
+        """The figures of one channel (figures.json of roadfix evaluate) after import, replay and evaluation."""
+
+        def run():
+            out, _ = self.replayed(stages, drive, *flags)
+            report = self.folder(drive, *flags) / "report"
+            self.roadfix("evaluate", out, "--out", report, "--channel", channel, *evaluate)
+            figures = json.loads((report / "figures.json").read_text())
+            out.unlink()  # windows make dozens of runs; the figures are what is kept
+            self.imported(drive, *flags)[0].unlink(missing_ok=True)
+            return figures["channels"][channel]
+
+        return self.once(("score", channel, stages, drive, flags, evaluate), run)
+
+    def windows(self, channel, stages, drive, length, first, every, phases, *flags):
+        """RMS of the horizontal errors at the ends of all outages of all phases, m; one run a phase."""
+        ends = []
+        for phase in phases:
+            cut = ("--cut-gnss", length, "--every", every, "--after", first, "--phase", phase)
+            outages = self.scored(channel, stages, drive, *cut, *flags)["outages"]
+            if outages["missing"]:
+                raise Skipped(f"{outages['missing']} outages of phase {phase} end without an estimate")
+            ends += [outage["horizontal_m"] for outage in outages["each"]]
+        if not ends:
+            raise Skipped("the drive has no such outage")
+        return root_mean_square(ends)

@@ -1,0 +1,86 @@
+"""Tests of scripts/figures and scripts/readme-tables, run by CTest with the repository's root as argument."""
+import importlib.machinery
+import importlib.util
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(sys.argv.pop(1)).resolve()
+sys.dont_write_bytecode = True
+
+
+def load(name):
+    loader = importlib.machinery.SourceFileLoader(name.replace("-", "_"), str(ROOT / "scripts" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+class Reach(unittest.TestCase):
+    def test_the_three_forms(self):
+        reached = load("figures").reached
+        self.assertTrue(reached(3.0, "<=3"))
+        self.assertFalse(reached(3.01, "<=3"))
+        self.assertTrue(reached(0.99, ">=0.99"))
+        self.assertFalse(reached(0.989, ">=0.99"))
+        self.assertTrue(reached(1.0, "0.84..1.18"))
+        self.assertFalse(reached(0.83, "0.84..1.18"))
+        self.assertFalse(reached(1.19, "0.84..1.18"))
+
+    def test_nan_reaches_nothing(self):
+        reached = load("figures").reached
+        for reach in ("<=3", ">=3", "0.8..1.2"):
+            self.assertFalse(reached(float("nan"), reach))
+
+
+class Measurements(unittest.TestCase):
+    def test_every_measurement_is_a_row(self):
+        table = ROOT / ".." / "shared" / "figures.tsv"
+        if not table.exists():
+            self.skipTest("../shared/figures.tsv is not here")
+        figures = load("figures")
+        ids = {row["id"] for row in figures.read_rows(table)}
+        for path in (ROOT / "scripts" / "figures.d").glob("*.py"):
+            if path.stem == "support":
+                continue
+            for key in figures.load_measurements(path.stem):
+                self.assertIn(f"{path.stem}.{key}", ids)
+
+
+class ReadmeTables(unittest.TestCase):
+    def run_on(self, text, measured, *flags):
+        with tempfile.TemporaryDirectory() as folder:
+            readme = Path(folder) / "README.md"
+            readme.write_text(text)
+            command = [sys.executable, ROOT / "scripts" / "readme-tables", "--readme", readme, *flags]
+            done = subprocess.run(command, input=measured, text=True, capture_output=True, check=False)
+            return readme.read_text(), done
+
+    TEXT = "before\n<!-- figures first_light -->\nold\n<!-- end -->\nafter\n"
+    ROW = "first_light.car_h_m\t0.1\tm\t<=0.15\tyes\n"
+
+    def test_a_table_goes_between_its_markers_and_nowhere_else(self):
+        text, _ = self.run_on(self.TEXT, self.ROW)
+        self.assertIn("| `first_light.car_h_m` | 0.1 | m | <=0.15 | yes |", text)
+        self.assertNotIn("old", text)
+        self.assertTrue(text.startswith("before\n<!-- figures first_light -->\n"))
+        self.assertTrue(text.endswith("<!-- end -->\nafter\n"))
+
+    def test_without_rows_the_old_table_stays(self):
+        text, _ = self.run_on(self.TEXT, "")
+        self.assertEqual(text, self.TEXT)
+
+    def test_check_changes_nothing_and_says_so(self):
+        text, done = self.run_on(self.TEXT, self.ROW, "--check")
+        self.assertEqual(text, self.TEXT)
+        self.assertEqual(done.returncode, 1)
+
+    def test_a_missing_marker_is_named(self):
+        _, done = self.run_on("nothing\n", self.ROW)
+        self.assertIn("no marker for first_light", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
