@@ -1,0 +1,49 @@
+/// Eight floats at a time, through the vector extensions of GCC and clang: what the picture's inner loops compute with.
+/// Every operation is exactly rounded, lane by lane, so the result does not depend on how pixels are grouped in lanes.
+#pragma once
+
+#include <cstdint>
+
+namespace roadfix {
+
+inline constexpr int kLanes = 8;
+using F8 = float __attribute__((vector_size(32)));
+using I8 = std::int32_t __attribute__((vector_size(32)));
+using I4x64 = std::int64_t __attribute__((vector_size(32)));
+using U8 = std::uint32_t __attribute__((vector_size(32)));
+
+inline F8 splat(float x) { return F8{x, x, x, x, x, x, x, x}; }
+inline U8 splat(std::uint32_t x) { return U8{x, x, x, x, x, x, x, x}; }
+inline F8 select(I8 mask, F8 yes, F8 no) { return mask ? yes : no; }
+inline F8 min(F8 a, F8 b) { return a < b ? a : b; }
+inline F8 max(F8 a, F8 b) { return a > b ? a : b; }
+inline F8 abs(F8 a) { return max(a, -a); }
+inline F8 clamp(F8 x, F8 lo, F8 hi) { return min(max(x, lo), hi); }
+inline F8 clamp01(F8 x) { return clamp(x, splat(0.0F), splat(1.0F)); }
+inline F8 mix(F8 a, F8 b, F8 share) { return a + (b - a) * share; }
+inline F8 to_float(I8 x) { return __builtin_convertvector(x, F8); }
+inline I8 to_int(F8 x) { return __builtin_convertvector(x, I8); }
+/// For |x| < 2^31; a comparison gives -1 where it holds, which is the correction of the truncation.
+inline I8 floor_int(F8 x) {
+  const I8 truncated = to_int(x);
+  return truncated + (to_float(truncated) > x);
+}
+inline bool any(I8 mask) {
+  const auto x = (I4x64)mask;
+  return ((x[0] | x[1]) | (x[2] | x[3])) != 0;
+}
+
+/// Mixes the bits of h: the finaliser of MurmurHash3 (Appleby, 2011).
+inline U8 mix_bits(U8 h) {
+  h ^= h >> 16;
+  h *= 0x85EBCA6BU;
+  h ^= h >> 13;
+  h *= 0xC2B2AE35U;
+  return h ^ (h >> 16);
+}
+/// A number for the lattice cell (x, y) of a surface.
+inline U8 hash_cell(I8 x, I8 y, U8 key) { return mix_bits((U8)x * 0x9E3779B1U ^ mix_bits((U8)y * 0x85EBCA77U + key)); }
+/// The bits [shift, shift + 8) of h as a number in [0, 1).
+inline F8 fraction(U8 h, unsigned shift) { return to_float((I8)((h >> shift) & 0xFFU)) * (1.0F / 256.0F); }
+
+}  // namespace roadfix

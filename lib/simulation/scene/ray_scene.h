@@ -1,0 +1,79 @@
+/// Rays against the world, through Embree: what the camera sees, and what lies in the shade.
+///
+/// Embree computes in floats, so rays are cast in *windows*: the faces within kWindowRadius_m of a grid point near the
+/// camera, in coordinates from that point. The window depends on the camera's position alone, never on what was asked
+/// before. Embree is pinned to AVX2 and to building on the calling thread (DESIGN.md, section 5).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "simulation/scene/lanes.h"
+#include "simulation/scene/world.h"
+
+namespace roadfix {
+
+/// What shading needs to know of a face, in window coordinates and floats.
+struct FaceShade {
+  std::array<float, 3> normal;
+  std::array<float, 3> grad_s;  ///< of the texture coordinate by the point
+  std::array<float, 3> grad_t;
+  float s, t;  ///< at corner 0, from the block's origin
+  float extent_s, extent_t;
+  std::int32_t block_s, block_t;
+  std::array<float, 4> light;
+  float tint, pattern_s, pattern_t;
+  std::int32_t material, pattern;
+  std::uint32_t key, group;
+  std::array<float, 3> velocity;  ///< m/s, enu axes
+};
+
+struct RayLanes {
+  F8 x, y, z;     ///< origin, window coordinates
+  F8 dx, dy, dz;  ///< direction, any length
+};
+
+/// Face -1: nothing hit. distance in lengths of the direction; u, v along the face's edges.
+struct HitLanes {
+  I8 face;
+  F8 distance, u, v;
+};
+
+class RayWindow;  // one window's Embree scenes
+
+class RayScene {
+ public:
+  explicit RayScene(const World& world);
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  /// Makes the window around a camera and puts the moving cars where they are at t_s. Not thread safe; what it returns
+  /// is, and stays valid until the next call.
+  const RayWindow& prepare(const Eigen::Vector3d& p_enu_camera, double t_s);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+class RayWindow {
+ public:
+  struct Impl;
+  explicit RayWindow(std::unique_ptr<Impl> impl);
+  ~RayWindow();
+
+  [[nodiscard]] const Eigen::Vector3d& origin() const;        ///< enu
+  [[nodiscard]] const std::vector<FaceShade>& faces() const;  ///< static ones first, then those of moving cars
+  [[nodiscard]] HitLanes intersect(const RayLanes& rays) const;
+  /// -1 where something lies between the ray's origin and `reach` lengths of its direction; lanes not `active` give 0.
+  [[nodiscard]] I8 occluded(const RayLanes& rays, I8 active, F8 reach) const;
+  [[nodiscard]] bool occluded(const Eigen::Vector3d& from_enu, const Eigen::Vector3d& to_enu) const;
+
+ private:
+  friend class RayScene;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace roadfix

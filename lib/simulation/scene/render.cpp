@@ -1,0 +1,180 @@
+#include "simulation/scene/render.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "simulation/scene/shading.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int kBandRows = 8;
+/// Places of an edge pixel's four rays in it: a rotated grid, no two in one row or column.
+constexpr float kGridU[4] = {-0.125F, 0.375F, -0.375F, 0.125F};
+constexpr float kGridV[4] = {-0.375F, -0.125F, 0.125F, 0.375F};
+
+}  // namespace
+
+/// What all bands of one picture share.
+struct Renderer::Frame {
+  const RayWindow& window;
+  Eigen::Matrix3f R;      // camera to enu
+  Eigen::Vector3f eye;    // window coordinates
+  Eigen::Vector3f drift;  // camera's velocity, enu
+  Eigen::Vector3f rate;   // its angular rate, enu axes
+  Eigen::Vector3f to_sun;
+};
+
+/// Normalised coordinates of eight pixels and their derivatives by column and row.
+struct Renderer::Pixels {
+  F8 x, y, x_u, y_u, x_v, y_v;
+};
+
+Renderer::Renderer(const World& world, const Camera& camera)
+    : to_sun_(world.to_sun), width_(camera.intrinsics().width), height_(camera.intrinsics().height) {
+  ray_x_.reserve(static_cast<std::size_t>((width_ + 2) * (height_ + 2)));
+  ray_y_.reserve(ray_x_.capacity());
+  for (int v = -1; v <= height_; ++v) {
+    for (int u = -1; u <= width_; ++u) {
+      const auto n = camera.unproject({static_cast<double>(u), static_cast<double>(v)});
+      if (!n) throw std::invalid_argument("scene: the camera model has no ray for some pixel of its picture");
+      ray_x_.push_back(static_cast<float>(n->x()));
+      ray_y_.push_back(static_cast<float>(n->y()));
+    }
+  }
+}
+
+Renderer::Pixels Renderer::directions(const int (&x)[kLanes], const int (&y)[kLanes]) const {
+  Pixels p;
+  const auto stride = static_cast<std::size_t>(width_ + 2);
+  for (int i = 0; i < kLanes; ++i) {
+    const std::size_t at = static_cast<std::size_t>(y[i] + 1) * stride + static_cast<std::size_t>(x[i] + 1);
+    p.x[i] = ray_x_[at];
+    p.y[i] = ray_y_[at];
+    p.x_u[i] = 0.5F * (ray_x_[at + 1] - ray_x_[at - 1]);
+    p.y_u[i] = 0.5F * (ray_y_[at + 1] - ray_y_[at - 1]);
+    p.x_v[i] = 0.5F * (ray_x_[at + stride] - ray_x_[at - stride]);
+    p.y_v[i] = 0.5F * (ray_y_[at + stride] - ray_y_[at - stride]);
+  }
+  return p;
+}
+
+namespace {
+
+/// Rays through (x, y, 1) in camera axes, so that distances along them are depths.
+template <class Pixels>
+PixelRays rays_of(const Eigen::Matrix3f& R, const Eigen::Vector3f& eye, const Pixels& p, float scale) {
+  PixelRays r;
+  r.ray.x = splat(eye.x());
+  r.ray.y = splat(eye.y());
+  r.ray.z = splat(eye.z());
+  r.ray.dx = R(0, 0) * p.x + R(0, 1) * p.y + R(0, 2);
+  r.ray.dy = R(1, 0) * p.x + R(1, 1) * p.y + R(1, 2);
+  r.ray.dz = R(2, 0) * p.x + R(2, 1) * p.y + R(2, 2);
+  r.dx_u = scale * (R(0, 0) * p.x_u + R(0, 1) * p.y_u);
+  r.dy_u = scale * (R(1, 0) * p.x_u + R(1, 1) * p.y_u);
+  r.dz_u = scale * (R(2, 0) * p.x_u + R(2, 1) * p.y_u);
+  r.dx_v = scale * (R(0, 0) * p.x_v + R(0, 1) * p.y_v);
+  r.dy_v = scale * (R(1, 0) * p.x_v + R(1, 1) * p.y_v);
+  r.dz_v = scale * (R(2, 0) * p.x_v + R(2, 1) * p.y_v);
+  return r;
+}
+
+}  // namespace
+
+void Renderer::first_pass(const Frame& frame, int band, LightField& out) const {
+  const int end = std::min(height_, (band + 1) * kBandRows);
+  for (int row = band * kBandRows; row < end; ++row) {
+    for (int column = 0; column < width_; column += kLanes) {
+      int x[kLanes];
+      int y[kLanes];
+      for (int i = 0; i < kLanes; ++i) x[i] = std::min(column + i, width_ - 1), y[i] = row;
+      const Pixels p = directions(x, y);
+      const PixelRays rays = rays_of(frame.R, frame.eye, p, 1.0F);
+      const HitLanes hit = frame.window.intersect(rays.ray);
+      const Shade s = shade(frame.window, frame.to_sun, rays, hit);
+      for (int i = 0; i < kLanes && column + i < width_; ++i) {
+        const auto at = static_cast<std::size_t>(row * width_ + column + i);
+        const bool sky = hit.face[i] < 0;
+        const FaceShade* face = sky ? nullptr : &frame.window.faces()[static_cast<std::size_t>(hit.face[i])];
+        out.radiance[at] = s.radiance[i];
+        out.depth[at] = sky ? std::numeric_limits<float>::infinity() : hit.distance[i];
+        out.surface[at] = sky ? 0U : 2U * face->group + (s.sunlit[i] != 0 ? 1U : 0U);
+        // Velocity of the point against the camera over its depth, in camera axes, then in pixels.
+        const Eigen::Vector3f d(rays.ray.dx[i], rays.ray.dy[i], rays.ray.dz[i]);
+        Eigen::Vector3f w = -frame.rate.cross(d);
+        if (!sky)
+          w += (Eigen::Vector3f(face->velocity[0], face->velocity[1], face->velocity[2]) - frame.drift) /
+               hit.distance[i];
+        const Eigen::Vector3f c = frame.R.transpose() * w;
+        const float nx = c.x() - p.x[i] * c.z();
+        const float ny = c.y() - p.y[i] * c.z();
+        const float determinant = p.x_u[i] * p.y_v[i] - p.x_v[i] * p.y_u[i];
+        out.flow_u[at] = (p.y_v[i] * nx - p.x_v[i] * ny) / determinant;
+        out.flow_v[at] = (p.x_u[i] * ny - p.y_u[i] * nx) / determinant;
+      }
+    }
+  }
+}
+
+void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
+  const auto on_edge = [&](int x, int y) {
+    const std::uint32_t here = out.surface[static_cast<std::size_t>(y * width_ + x)];
+    const auto differs = [&](int column, int row) {
+      return column >= 0 && column < width_ && row >= 0 && row < height_ &&
+             out.surface[static_cast<std::size_t>(row * width_ + column)] != here;
+    };
+    return differs(x - 1, y) || differs(x + 1, y) || differs(x, y - 1) || differs(x, y + 1);
+  };
+  int x[kLanes];
+  int y[kLanes];
+  int pending = 0;  // pixels waiting; two fill the lanes
+  const auto flush = [&] {
+    if (pending == 0) return;
+    for (int i = 4 * pending; i < kLanes; ++i) x[i] = x[0], y[i] = y[0];
+    Pixels p = directions(x, y);
+    for (int i = 0; i < kLanes; ++i) {
+      p.x[i] += kGridU[i % 4] * p.x_u[i] + kGridV[i % 4] * p.x_v[i];
+      p.y[i] += kGridU[i % 4] * p.y_u[i] + kGridV[i % 4] * p.y_v[i];
+    }
+    const PixelRays rays = rays_of(frame.R, frame.eye, p, 0.5F);
+    const F8 light = shade(frame.window, frame.to_sun, rays, frame.window.intersect(rays.ray)).radiance;
+    for (int k = 0; k < pending; ++k) {
+      const int i = 4 * k;
+      out.radiance[static_cast<std::size_t>(y[i] * width_ + x[i])] =
+          0.25F * ((light[i] + light[i + 1]) + (light[i + 2] + light[i + 3]));
+    }
+    pending = 0;
+  };
+  const int end = std::min(height_, (band + 1) * kBandRows);
+  for (int row = band * kBandRows; row < end; ++row) {
+    for (int column = 0; column < width_; ++column) {
+      if (!on_edge(column, row)) continue;
+      for (int i = 4 * pending; i < 4 * pending + 4; ++i) x[i] = column, y[i] = row;
+      if (++pending == 2) flush();
+    }
+  }
+  flush();
+}
+
+void Renderer::render(RayScene& scene, const View& view, const ParallelFor& parallel_for, LightField& out) const {
+  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s);
+  const Eigen::Matrix3d R = view.T_enu_camera.R();
+  const Frame frame{window,
+                    R.cast<float>(),
+                    (view.T_enu_camera.p - window.origin()).cast<float>(),
+                    view.velocity_enu.cast<float>(),
+                    (R * view.angular_rate).cast<float>(),
+                    to_sun_.cast<float>()};
+  out.width = width_;
+  out.height = height_;
+  const auto pixels = static_cast<std::size_t>(width_ * height_);
+  for (auto* plane : {&out.radiance, &out.depth, &out.flow_u, &out.flow_v}) plane->resize(pixels);
+  out.surface.resize(pixels);
+  const int bands = (height_ + kBandRows - 1) / kBandRows;
+  parallel_for(bands, [&](int band) { first_pass(frame, band, out); });
+  parallel_for(bands, [&](int band) { edge_pass(frame, band, out); });
+}
+
+}  // namespace roadfix

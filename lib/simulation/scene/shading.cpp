@@ -1,0 +1,163 @@
+#include "simulation/scene/shading.h"
+
+#include <cmath>
+
+#include "simulation/scene/texture.h"
+
+namespace roadfix {
+namespace {
+
+constexpr float kHaze_m = 700.0F;  // where half of what one sees is haze
+constexpr float kHorizon = 0.62F;  // radiance of the sky, white in the sun = 1
+constexpr float kZenith = 0.36F;
+constexpr float kCloud_m = 900.0F;        // height of the clouds
+constexpr float kShadowOffset_m = 0.01F;  // ray origins are lifted off the surface by this
+constexpr float kShadowReach_m = 120.0F;  // longer shadows than any house's at noon
+constexpr float kWidest_m = 60.0F;        // of a footprint
+
+struct V8 {
+  F8 x, y, z;
+};
+F8 dot(const V8& a, const V8& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+/// The faces under eight pixels, lane by lane; the sky's lanes hold face 0.
+struct FaceLanes {
+  V8 normal, grad_s, grad_t;
+  F8 extent_s, extent_t, light[4];
+  SurfaceLanes surface;
+};
+
+/// All lanes on one face, the usual case.
+FaceLanes spread(const FaceShade& s) {
+  FaceLanes f;
+  f.normal = {splat(s.normal[0]), splat(s.normal[1]), splat(s.normal[2])};
+  f.grad_s = {splat(s.grad_s[0]), splat(s.grad_s[1]), splat(s.grad_s[2])};
+  f.grad_t = {splat(s.grad_t[0]), splat(s.grad_t[1]), splat(s.grad_t[2])};
+  for (int k = 0; k < 4; ++k) f.light[k] = splat(s.light[static_cast<std::size_t>(k)]);
+  f.extent_s = splat(s.extent_s);
+  f.extent_t = splat(s.extent_t);
+  const I8 zero{};
+  f.surface.s = splat(s.s);
+  f.surface.t = splat(s.t);
+  f.surface.block_s = zero + s.block_s;
+  f.surface.block_t = zero + s.block_t;
+  f.surface.material = zero + s.material;
+  f.surface.pattern = zero + s.pattern;
+  f.surface.key = splat(s.key);
+  f.surface.tint = splat(s.tint);
+  f.surface.pattern_s = splat(s.pattern_s);
+  f.surface.pattern_t = splat(s.pattern_t);
+  return f;
+}
+
+FaceLanes gather(const RayWindow& window, const HitLanes& hit) {
+  if (hit.face[0] >= 0 && !any(hit.face != hit.face[0]))
+    return spread(window.faces()[static_cast<std::size_t>(hit.face[0])]);
+  FaceLanes f;
+  for (int i = 0; i < kLanes; ++i) {
+    const FaceShade& s = window.faces()[static_cast<std::size_t>(hit.face[i] < 0 ? 0 : hit.face[i])];
+    f.normal.x[i] = s.normal[0], f.normal.y[i] = s.normal[1], f.normal.z[i] = s.normal[2];
+    f.grad_s.x[i] = s.grad_s[0], f.grad_s.y[i] = s.grad_s[1], f.grad_s.z[i] = s.grad_s[2];
+    f.grad_t.x[i] = s.grad_t[0], f.grad_t.y[i] = s.grad_t[1], f.grad_t.z[i] = s.grad_t[2];
+    for (int k = 0; k < 4; ++k) f.light[k][i] = s.light[static_cast<std::size_t>(k)];
+    f.extent_s[i] = s.extent_s;
+    f.extent_t[i] = s.extent_t;
+    SurfaceLanes& p = f.surface;
+    p.s[i] = s.s;
+    p.t[i] = s.t;
+    p.block_s[i] = s.block_s;
+    p.block_t[i] = s.block_t;
+    p.material[i] = s.material;
+    p.pattern[i] = s.pattern;
+    p.key[i] = s.key;
+    p.tint[i] = s.tint;
+    p.pattern_s[i] = s.pattern_s;
+    p.pattern_t[i] = s.pattern_t;
+  }
+  return f;
+}
+
+/// Moves coordinates beyond the block's end into the next blocks.
+void carry_block(F8& x, I8& block) {
+  const I8 over = floor_int(x * static_cast<float>(1.0 / kTextureBlock_m));
+  x -= to_float(over) * static_cast<float>(kTextureBlock_m);
+  block += over;
+}
+
+/// Texture coordinates and footprint of the points hit: a step of one pixel moves the point in the face's plane.
+void locate(const PixelRays& p, const HitLanes& hit, const V8& direction, FaceLanes& f) {
+  SurfaceLanes& x = f.surface;
+  x.s += hit.u * f.extent_s;
+  x.t += hit.v * f.extent_t;
+  carry_block(x.s, x.block_s);
+  carry_block(x.t, x.block_t);
+  const F8 along = dot(f.normal, direction);
+  const auto step = [&](const V8& d) {
+    const F8 slide = dot(f.normal, d) / along;
+    return V8{hit.distance * (d.x - slide * direction.x), hit.distance * (d.y - slide * direction.y),
+              hit.distance * (d.z - slide * direction.z)};
+  };
+  const V8 u = step({p.dx_u, p.dy_u, p.dz_u});
+  const V8 v = step({p.dx_v, p.dy_v, p.dz_v});
+  x.width_s = min(abs(dot(f.grad_s, u)) + abs(dot(f.grad_s, v)), splat(kWidest_m));
+  x.width_t = min(abs(dot(f.grad_t, u)) + abs(dot(f.grad_t, v)), splat(kWidest_m));
+}
+
+F8 sky(const V8& d, const F8& length) {
+  const F8 up = max(d.z / length, splat(0.0F));
+  const F8 clear = kHorizon + (kZenith - kHorizon) * clamp01(up * 2.0F);
+  // Clouds: grain of a plane high above, anchored to the window so far away that nobody sees it move.
+  SurfaceLanes p{};
+  const F8 reach = kCloud_m / max(d.z, splat(1e-3F) * length);
+  p.s = clamp(d.x * reach, splat(-20000.0F), splat(20000.0F)) * (1.0F / 64.0F);
+  p.t = clamp(d.y * reach, splat(-20000.0F), splat(20000.0F)) * (1.0F / 64.0F);
+  p.material += static_cast<std::int32_t>(Material::kGround);
+  p.tint = splat(1.0F);
+  p.width_s = p.width_t = splat(0.35F);
+  const F8 cloud = (albedo(p) - 0.22F) * clamp01(up * 6.0F);
+  return clear + 1.2F * cloud;
+}
+
+}  // namespace
+
+Shade shade(const RayWindow& window, const Eigen::Vector3f& to_sun, const PixelRays& pixels, const HitLanes& hit) {
+  const V8 d{pixels.ray.dx, pixels.ray.dy, pixels.ray.dz};
+  F8 length = dot(d, d);
+  for (int i = 0; i < kLanes; ++i) length[i] = std::sqrt(length[i]);
+  const I8 is_sky = hit.face < 0;
+  Shade out{splat(0.0F), I8{}};
+  if (any(hit.face >= 0)) {
+    HitLanes safe = hit;
+    safe.distance = select(is_sky, splat(1.0F), hit.distance);
+    FaceLanes f = gather(window, hit);
+    const F8 towards = select(dot(f.normal, d) > 0.0F, splat(-1.0F), splat(1.0F));
+    const V8 n{f.normal.x * towards, f.normal.y * towards, f.normal.z * towards};
+    locate(pixels, safe, d, f);
+    const F8 facing = n.x * to_sun.x() + n.y * to_sun.y() + n.z * to_sun.z();
+    const I8 lamp = f.surface.material == static_cast<std::int32_t>(Material::kLamp);
+    const I8 day = (facing > 0.0F) & ~is_sky & ~lamp;
+    if (any(day)) {
+      const F8 lift = kShadowOffset_m + 2e-4F * safe.distance;
+      const RayLanes to_light{pixels.ray.x + safe.distance * d.x + lift * n.x,
+                              pixels.ray.y + safe.distance * d.y + lift * n.y,
+                              pixels.ray.z + safe.distance * d.z + lift * n.z,
+                              splat(to_sun.x()),
+                              splat(to_sun.y()),
+                              splat(to_sun.z())};
+      out.sunlit = day & ~window.occluded(to_light, day, splat(kShadowReach_m));
+    }
+    const F8 u = hit.u;
+    const F8 v = hit.v;
+    const F8 ambient = mix(mix(f.light[0], f.light[1], u), mix(f.light[3], f.light[2], u), v);
+    const F8 light = ambient + select(out.sunlit, facing, splat(0.0F));
+    const F8 radiance = select(lamp, f.surface.tint, albedo(f.surface) * light);
+    const F8 far = safe.distance * length * (1.0F / kHaze_m);
+    // What lies in the dark has no lit air before it.
+    const F8 haze = far * far / (1.0F + far * far) * clamp01(ambient * 8.0F);
+    out.radiance = mix(radiance, splat(kHorizon), haze);
+  }
+  if (any(is_sky)) out.radiance = select(is_sky, sky(d, length), out.radiance);
+  return out;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,167 @@
+#include "simulation/scene/texture.h"
+
+#include "simulation/scene/pattern.h"
+
+namespace roadfix {
+namespace {
+
+/// One scale of grain: cells of size_s by size_t (m, powers of two, so that dividing by them is exact), albedo +-
+/// amplitude.
+struct Layer {
+  float size_s, size_t, amplitude;
+};
+constexpr int kSmooth = 3;
+constexpr int kPatches = 3;
+struct Grain {
+  float albedo;
+  Layer smooth[kSmooth];
+  Layer patch[kPatches];
+};
+
+// Albedos: road 0.1-0.2, concrete 0.3-0.5, plaster 0.4-0.7, brick 0.2-0.3 (Oke, Boundary Layer Climates, 1987, table
+// 8.1). Cells from centimetres (texture at arm's length) to metres (what is left of it 40 m away); amplitudes by eye.
+constexpr Grain kGrain[] = {
+    /* asphalt  */ {0.20F,
+                    {{0.03125F, 0.03125F, 0.05F}, {0.5F, 0.25F, 0.03F}, {8.0F, 0.5F, 0.03F}},
+                    {{0.125F, 0.0625F, 0.05F}, {1.0F, 0.25F, 0.09F}, {8.0F, 1.0F, 0.07F}}},
+    /* pavement */
+    {0.34F,
+     {{0.03125F, 0.03125F, 0.05F}, {0.25F, 0.25F, 0.04F}, {4.0F, 1.0F, 0.04F}},
+     {{0.125F, 0.125F, 0.04F}, {0.5F, 0.5F, 0.09F}, {4.0F, 2.0F, 0.08F}}},
+    /* ground   */
+    {0.22F,
+     {{0.125F, 0.125F, 0.06F}, {1.0F, 1.0F, 0.06F}, {8.0F, 8.0F, 0.05F}},
+     {{0.25F, 0.25F, 0.06F}, {2.0F, 2.0F, 0.06F}, {16.0F, 16.0F, 0.04F}}},
+    /* plaster  */
+    {0.50F,
+     {{0.0625F, 0.0625F, 0.03F}, {0.5F, 0.5F, 0.03F}, {4.0F, 2.0F, 0.05F}},
+     {{0.25F, 0.25F, 0.05F}, {1.0F, 1.0F, 0.05F}, {4.0F, 4.0F, 0.04F}}},
+    /* brick    */
+    {0.28F,
+     {{0.0625F, 0.0625F, 0.03F}, {0.5F, 0.5F, 0.03F}, {4.0F, 2.0F, 0.04F}},
+     {{0.25F, 0.125F, 0.09F}, {1.0F, 0.5F, 0.04F}, {4.0F, 4.0F, 0.04F}}},
+    /* roof     */
+    {0.24F,
+     {{0.125F, 0.125F, 0.03F}, {1.0F, 1.0F, 0.03F}, {4.0F, 4.0F, 0.03F}},
+     {{0.5F, 0.25F, 0.07F}, {2.0F, 2.0F, 0.03F}, {8.0F, 8.0F, 0.02F}}},
+    /* concrete */
+    {0.40F,
+     {{0.0625F, 0.0625F, 0.03F}, {1.0F, 0.5F, 0.05F}, {0.5F, 4.0F, 0.05F}},
+     {{0.25F, 0.25F, 0.10F}, {1.0F, 1.0F, 0.10F}, {4.0F, 4.0F, 0.06F}}},
+    /* tunnel   */
+    {0.50F,
+     {{0.0625F, 0.0625F, 0.03F}, {0.5F, 1.0F, 0.05F}, {4.0F, 1.0F, 0.05F}},
+     {{0.25F, 0.25F, 0.12F}, {1.0F, 0.5F, 0.16F}, {4.0F, 2.0F, 0.08F}}},
+    /* blank    */
+    {0.62F,
+     {{0.125F, 0.125F, 0.004F}, {1.0F, 1.0F, 0.006F}, {8.0F, 8.0F, 0.01F}},
+     {{0.125F, 0.125F, 0.0F}, {1.0F, 1.0F, 0.0F}, {8.0F, 8.0F, 0.0F}}},
+    /* car body */
+    {0.45F,
+     {{0.125F, 0.125F, 0.01F}, {1.0F, 1.0F, 0.04F}, {4.0F, 0.5F, 0.03F}},
+     {{0.25F, 0.125F, 0.01F}, {1.0F, 1.0F, 0.0F}, {4.0F, 4.0F, 0.0F}}},
+    /* metal    */
+    {0.38F,
+     {{0.0625F, 0.0625F, 0.02F}, {0.5F, 0.5F, 0.04F}, {4.0F, 2.0F, 0.03F}},
+     {{0.25F, 0.25F, 0.09F}, {1.0F, 1.0F, 0.08F}, {4.0F, 4.0F, 0.03F}}},
+    /* lamp     */
+    {0.90F,
+     {{1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}},
+     {{1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}}},
+    /* board    */
+    {0.50F,
+     {{1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}},
+     {{1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}}},
+};
+
+/// A layer's cell under each lane.
+struct Cells {
+  I8 x, y;    ///< lattice numbers, the same from every block
+  F8 fx, fy;  ///< place in the cell, 0 to 1
+  F8 wx, wy;  ///< footprint in cells
+  F8 amplitude;
+};
+
+/// The layers of eight lanes.
+struct LayerLanes {
+  F8 per_s, per_t, amplitude;  // one over the sizes
+};
+
+Cells cells_of(const SurfaceLanes& p, const LayerLanes& layer) {
+  Cells c;
+  c.amplitude = layer.amplitude;
+  const F8 x = p.s * layer.per_s;
+  const F8 y = p.t * layer.per_t;
+  const I8 ix = floor_int(x);
+  const I8 iy = floor_int(y);
+  constexpr auto kBlock = static_cast<float>(kTextureBlock_m);
+  c.x = ix + p.block_s * to_int(kBlock * layer.per_s);
+  c.y = iy + p.block_t * to_int(kBlock * layer.per_t);
+  c.fx = x - to_float(ix);
+  c.fy = y - to_float(iy);
+  c.wx = p.width_s * layer.per_s;
+  c.wy = p.width_t * layer.per_t;
+  return c;
+}
+
+/// Value noise, zero mean: the lattice points' random values, joined smoothly.
+F8 smooth_noise(const Cells& c, U8 key) {
+  const F8 ease_x = c.fx * c.fx * (3.0F - 2.0F * c.fx);
+  const F8 ease_y = c.fy * c.fy * (3.0F - 2.0F * c.fy);
+  const F8 low = mix(fraction(hash_cell(c.x, c.y, key), 0), fraction(hash_cell(c.x + 1, c.y, key), 0), ease_x);
+  const F8 high = mix(fraction(hash_cell(c.x, c.y + 1, key), 0), fraction(hash_cell(c.x + 1, c.y + 1, key), 0), ease_x);
+  const F8 keep = clamp01(1.25F - c.wx) * clamp01(1.25F - c.wy);
+  return c.amplitude * keep * (2.0F * mix(low, high, ease_y) - 1.0F);
+}
+
+/// In two of three cells a rectangle of random place, size and shade.
+F8 patches(const Cells& c, U8 key) {
+  const U8 h = hash_cell(c.x, c.y, key);
+  const U8 g = mix_bits(h + 0x9E3779B9U);
+  const F8 left = 0.06F + 0.45F * fraction(h, 0);
+  const F8 bottom = 0.06F + 0.45F * fraction(h, 8);
+  const F8 covered = coverage(c.fx, c.wx, left, left + 0.12F + 0.30F * fraction(h, 16)) *
+                     coverage(c.fy, c.wy, bottom, bottom + 0.12F + 0.30F * fraction(h, 24));
+  const F8 shade = 2.0F * fraction(g, 0) - 1.0F;
+  const F8 keep = clamp01(2.0F - 2.0F * c.wx) * clamp01(2.0F - 2.0F * c.wy);
+  return select(fraction(g, 8) < 0.66F,
+                c.amplitude * keep * covered * (shade + select(shade < 0.0F, splat(-0.5F), splat(0.5F))), splat(0.0F));
+}
+
+/// One lane after the other, or all at once where one material fills them.
+LayerLanes layers_of(const SurfaceLanes& p, bool one_material, const Layer& (*layer)(const Grain&, int), int k) {
+  LayerLanes out;
+  if (one_material) {
+    const Layer& l = layer(kGrain[p.material[0]], k);
+    return {splat(1.0F / l.size_s), splat(1.0F / l.size_t), splat(l.amplitude)};
+  }
+  for (int i = 0; i < kLanes; ++i) {
+    const Layer& l = layer(kGrain[p.material[i]], k);
+    out.per_s[i] = 1.0F / l.size_s;
+    out.per_t[i] = 1.0F / l.size_t;
+    out.amplitude[i] = l.amplitude;
+  }
+  return out;
+}
+
+}  // namespace
+
+F8 albedo(const SurfaceLanes& p) {
+  const bool one_material = !any(p.material != p.material[0]);
+  F8 base;
+  for (int i = 0; i < kLanes; ++i) base[i] = kGrain[p.material[i]].albedo;
+  F8 speckle = splat(0.0F);
+  for (int k = 0; k < kSmooth; ++k) {
+    const auto layer = layers_of(
+        p, one_material, [](const Grain& g, int n) -> const Layer& { return g.smooth[n]; }, k);
+    speckle += smooth_noise(cells_of(p, layer), p.key + static_cast<std::uint32_t>(k));
+  }
+  for (int k = 0; k < kPatches; ++k) {
+    const auto layer = layers_of(
+        p, one_material, [](const Grain& g, int n) -> const Layer& { return g.patch[n]; }, k);
+    speckle += patches(cells_of(p, layer), p.key + static_cast<std::uint32_t>(k + kSmooth));
+  }
+  return clamp(paint(p, base * p.tint, speckle), splat(0.01F), splat(0.95F));
+}
+
+}  // namespace roadfix
