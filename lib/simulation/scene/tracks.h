@@ -1,0 +1,59 @@
+/// Tracks without pixels: points on the world's surfaces, projected with noise, hidden where something stands before
+/// them, mixed with outliers. What a feature tracker would give, hundreds of times faster than by drawing pictures,
+/// with the truth beside every observation.
+///
+/// Same world, configuration, seed and views in the same order give the same bits.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "camera/camera.h"
+#include "simulation/scene/render.h"
+
+namespace roadfix {
+
+struct TrackConfig {
+  int wanted = 200;       ///< tracks alive, as far as the scene gives them
+  double noise_px = 0.5;  ///< standard deviation of u and of v, every observation on its own
+  double nearest_m = 1.0;
+  double farthest_m = 60.0;
+  double loss_per_frame = 0.03;       ///< share of tracks that end though their point is still to be seen
+  double mismatch_per_frame = 0.002;  ///< share of tracks that from now on follow something else
+  double mismatch_px = 25.0;          ///< farthest from the truth
+  double darkest = 0.0015;            ///< light (Face::light) below which nothing is found
+  bool moving_cars = true;            ///< their points are outliers from the start
+};
+
+struct TrackObservation {
+  std::int64_t id = 0;                   ///< the same for one track through all its frames, never used again
+  Eigen::Vector2d left;                  ///< px
+  std::optional<Eigen::Vector2d> right;  ///< px, stereo only, where the right camera sees the point too
+  Eigen::Vector3d p_enu;                 ///< m, true point, now
+  bool is_outlier = false;               ///< the point moves, or the observation is not of it
+};
+
+class TrackSimulator {
+ public:
+  struct RightCamera {
+    Camera camera;
+    SE3 T_left_right;
+  };
+
+  TrackSimulator(const World& world, const TrackConfig& config, const Camera& left,
+                 const std::optional<RightCamera>& right, std::uint64_t seed);
+  ~TrackSimulator();
+  TrackSimulator(const TrackSimulator&) = delete;
+  TrackSimulator& operator=(const TrackSimulator&) = delete;
+
+  /// What the rig sees from the next place of the left camera; ascending ids.
+  std::vector<TrackObservation> observe(const View& left);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace roadfix
