@@ -76,12 +76,11 @@ struct GnssScreenConfig {
 
 /// Start, loss and recovery.
 struct AlignmentConfig {
-  double block = 1.0;             ///< s of samples to level with
   int headings = 8;               ///< hypotheses around the circle
   double heading_std_deg = 20.0;  ///< of each
   double confirm_probability = 0.999;
   double confirm_std_deg = 3.0;
-  double standing_accel_std = 0.3;      ///< m/s2, by which the mean specific force may miss gravity while standing
+  double standing_accel_std = 0.03;     ///< m/s2, by which the mean specific force may miss gravity while standing
   double moving_accel_std = 1.5;        ///< m/s2, while moving
   double velocity_std_standing = 0.05;  ///< m/s
   double recovery_s = 10.0;             ///< s of refused fixes, after which the filter and not the receiver is wrong
@@ -90,12 +89,85 @@ struct AlignmentConfig {
   double invalid_sigma_m = 100.0;  ///< horizontal; more is no position
 };
 
-struct GnssInsConfig {
-  GnssInsVehicle vehicle;
+/// One set for every vehicle.
+struct GnssInsTuning {
   AidingConfig aiding;
   PropagationConfig propagation;
   GnssScreenConfig screen;
   AlignmentConfig alignment;
 };
+
+struct GnssInsConfig : GnssInsTuning {
+  GnssInsVehicle vehicle;
+};
+
+template <class Visitor>
+void visit(AidingConfig& c, Visitor& v) {
+  v.number("gate_sigma", c.gate_sigma, 1.0, 100.0);
+  v.number("position_floor_m", c.position_floor, 0.0, 10.0);
+  v.number("velocity_floor_mps", c.velocity_floor, 0.0, 10.0);
+  v.number("velocity_default_mps", c.velocity_default, 1e-3, 10.0);
+  v.number("heading_floor_deg", c.heading_floor, 0.0, 90.0);
+  v.number("sideslip_std_mps", c.sideslip_std, 1e-3, 10.0);
+  v.number("sideslip_per_speed", c.sideslip_per_speed, 0.0, 1.0);
+  v.number("sideslip_interval_s", c.sideslip_interval, 0.01, 100.0);
+  v.number("wheel_interval_s", c.wheel_interval, 0.0, 100.0);
+  v.number("no_slip_x_std_m", c.no_slip_x_std, 0.0, 10.0);
+  v.number("zero_velocity_std_mps", c.zero_velocity_std, 1e-4, 1.0);
+  v.number("zero_rate_std_radps", c.zero_rate_std, 1e-6, 1.0);
+  v.number("zero_interval_s", c.zero_interval, 0.1, 10.0);
+  v.number("mag_std_rad", c.mag_std, 1e-3, 3.0);
+  v.boolean("use_gnss_velocity", c.use_gnss_velocity);
+  v.boolean("use_sideslip", c.use_sideslip);
+  v.boolean("use_wheels", c.use_wheels);
+  v.boolean("use_zero_velocity", c.use_zero_velocity);
+  v.boolean("use_mag", c.use_mag);
+}
+
+template <class Visitor>
+void visit(PropagationConfig& c, Visitor& v) {
+  v.number("covariance_interval_s", c.covariance_interval, 1e-4, 1.0);
+  v.number("max_gap_s", c.max_gap, 1e-3, 10.0);
+  v.number("realign_gap_s", c.realign_gap, 0.1, 1e4);
+  v.number("max_gyro_radps", c.max_gyro, 0.1, 100.0);
+  v.number("max_accel_mps2", c.max_accel, 10.0, 1e4);
+  v.number("vibration_factor", c.vibration_factor, 0.0, 100.0);
+  v.number("time_offset_walk_s_per_rts", c.time_offset_walk, 0.0, 1.0);
+  v.number("wheel_scale_walk_per_rts", c.wheel_scale_walk, 0.0, 1.0);
+  v.number("mounting_walk_rad_per_rts", c.mounting_walk, 0.0, 1.0);
+}
+
+template <class Visitor>
+void visit(GnssScreenConfig& c, Visitor& v) {
+  v.number("max_sigma_m", c.max_sigma_m, 0.01, 1e4);
+  v.integer("min_satellites", c.min_satellites, 0, 100);
+  v.number("max_pdop", c.max_pdop, 1.0, 100.0);
+  v.number("max_correction_age_s", c.max_correction_age_s, 1.0, 1e4);
+  v.number("hysteresis", c.hysteresis, 1.0, 10.0);
+  v.integer("probation_fixes", c.probation_fixes, 1, 1000);
+}
+
+template <class Visitor>
+void visit(AlignmentConfig& c, Visitor& v) {
+  v.integer("headings", c.headings, 1, 64);
+  v.number("heading_std_deg", c.heading_std_deg, 1.0, 180.0);
+  v.number("confirm_probability", c.confirm_probability, 0.5, 1.0);
+  v.number("confirm_std_deg", c.confirm_std_deg, 0.01, 90.0);
+  v.number("standing_accel_std_mps2", c.standing_accel_std, 1e-3, 10.0);
+  v.number("moving_accel_std_mps2", c.moving_accel_std, 1e-3, 10.0);
+  v.number("velocity_std_standing_mps", c.velocity_std_standing, 1e-3, 10.0);
+  v.number("recovery_s", c.recovery_s, 0.1, 1e4);
+  v.integer("recovery_fixes", c.recovery_fixes, 1, 1000);
+  v.number("coasting_s", c.coasting_s, 0.1, 1e4);
+  v.number("invalid_sigma_m", c.invalid_sigma_m, 0.1, 1e6);
+}
+
+template <class Visitor>
+void visit(GnssInsTuning& c, Visitor& v) {
+  v.group("aiding", c.aiding);
+  v.group("propagation", c.propagation);
+  v.group("screen", c.screen);
+  v.group("alignment", c.alignment);
+}
 
 }  // namespace roadfix

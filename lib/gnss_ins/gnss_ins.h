@@ -35,6 +35,7 @@ struct GnssInsStatus {
 };
 
 struct GnssInsOutput {
+  AlignmentPhase phase = AlignmentPhase::kWaiting;
   Odometry odometry;   ///< imu origin and axes in the anchor's enu
   std::string reason;  ///< plain words, empty when all is well
   int reset_counter = 0;

@@ -80,6 +80,7 @@ void GnssIns::rebase_forward() {
 
 GnssInsOutput GnssIns::output() {
   GnssInsOutput out;
+  out.phase = phase_;
   out.reset_counter = reset_counter_;
   out.reset_delta = reset_delta_;
   out.odometry.t_us = ring_.empty() ? last_step_us_ : ring_.back().t_us;

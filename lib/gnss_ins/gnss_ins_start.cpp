@@ -65,7 +65,7 @@ void GnssIns::try_start(const ImuSample& imu) {
                std::abs(b.accel.norm() - g) < 0.1 + 4.0 * config_.vehicle.accel_bias_std;
   s.mean_gyro = b.gyro;
   s.mean_accel = b.accel;
-  s.accel_std = s.standing ? 0.03 : config_.alignment.moving_accel_std;
+  s.accel_std = s.standing ? config_.alignment.standing_accel_std : config_.alignment.moving_accel_std;
   s.velocity = s.standing ? Eigen::Vector3d::Zero() : v->value;
   // A velocity between fixes is that of their middle, half their spacing and the fix's age ago.
   const double since = std::abs(age) + (fix_->velocity ? 0.0 : 0.5 * seconds_between(fix_before_->t_us, fix_->t_us));

@@ -60,6 +60,17 @@ class InsCore {
     a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size);
   }
 
+  /// Adds mean and covariance as they are held.
+  template <class Digest>
+  void digest(Digest& d) const {
+    d.add(x_.t_us);
+    d.add(local(NavState(), x_));
+    d.add(x_.q_enu_imu.coeffs());
+    d.add(P_);
+    d.add(sums_.velocity_change);
+    d.add(sums_.rotation);
+  }
+
  private:
   void flush();
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "gnss_ins_ekf/handler.h"
+
 namespace roadfix {
 
 namespace {
@@ -14,7 +16,9 @@ struct KnownStage {
 
 /// Each process adds its own line.
 const std::vector<KnownStage>& known_stages() {
-  static const std::vector<KnownStage> kStages = {};
+  static const std::vector<KnownStage> kStages = {
+      {"gnss_ins_ekf", [](const std::filesystem::path& dir) { return make_gnss_ins_ekf(dir); }},
+  };
   return kStages;
 }
 

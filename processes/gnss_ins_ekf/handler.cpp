@@ -1,0 +1,173 @@
+#include "gnss_ins_ekf/handler.h"
+
+#include <cmath>
+#include <roadfix/imu_t.hpp>
+#include <roadfix/mag_t.hpp>
+#include <roadfix/wheels_t.hpp>
+
+#include "bus/message.h"
+#include "bus/sample_codec.h"
+#include "config/config.h"
+#include "geometry/frames.h"
+#include "gnss_ins/gnss_ins.h"
+#include "gnss_ins_ekf/messages.h"
+#include "stream/state_bytes.h"
+
+namespace roadfix {
+
+namespace {
+
+enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3 };
+enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
+
+/// At most one per period of data time.
+class Slot {
+ public:
+  explicit Slot(double period_s) : period_us_(static_cast<int64_t>(std::llround(period_s * 1e6))) {}
+  bool due(int64_t utime) {
+    const int64_t slot = period_us_ > 0 ? utime / period_us_ : utime;
+    if (slot == last_) return false;
+    last_ = slot;
+    return true;
+  }
+  [[nodiscard]] int64_t last() const { return last_; }
+  void set_last(int64_t last) { last_ = last; }
+
+ private:
+  int64_t period_us_;
+  int64_t last_ = -1;
+};
+
+class GnssInsStage final : public Stage {
+ public:
+  GnssInsStage(const Calibration& calibration, const GnssInsProcessConfig& config)
+      : config_(config), pose_slot_(config.publish_period), status_slot_(config.status_period) {
+    static_cast<GnssInsTuning&>(filter_config_) = config.tuning;
+    filter_config_.vehicle = gnss_ins_vehicle(calibration);
+    filter_.emplace(filter_config_);
+    spec_.name = "gnss_ins_ekf";
+    spec_.inputs = {{"IMU", "imu_t", 0, 0},
+                    {"GNSS", "gnss_t", 250'000, 0},
+                    {"WHEELS", "wheels_t", 50'000, 0},
+                    {"MAG", "mag_t", 50'000, 0}};
+    spec_.clocks = {{kImu, 200'000}};
+    spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
+  }
+
+  [[nodiscard]] const StageSpec& spec() const override { return spec_; }
+
+  void apply(const Message& m) override {
+    switch (m.input) {
+      case kImu:
+        (void)filter_->advance(imu_sample(decode<imu_t>(m.bytes)));
+        break;
+      case kGnss:
+        filter_->add(gnss_fix(decode<gnss_t>(m.bytes)), m.seq);
+        break;
+      case kWheels:
+        filter_->add(wheel_sample(decode<wheels_t>(m.bytes)), m.seq);
+        break;
+      default:
+        filter_->add(mag_sample(decode<mag_t>(m.bytes)), m.seq);
+        break;
+    }
+  }
+
+  void on_clock(const Message& m) override { (void)filter_->see(imu_sample(decode<imu_t>(m.bytes))); }
+
+  void publish(int64_t now_utime, Outputs& outputs) override {
+    for (const AidingRecord& record : filter_->records()) {
+      aiding_t message = aiding(record);
+      outputs.publish(kAiding, message);
+    }
+    filter_->clear_records();
+    if (pose_slot_.due(now_utime)) {
+      pose_t pose{};
+      fill_ins_pose(filter_->output(), filter_->anchor(), pose);
+      outputs.publish(kPose, pose);
+    }
+    if (status_slot_.due(now_utime)) {
+      ins_status_t status = ins_status(filter_->status(), filter_->core(), filter_config_.vehicle);
+      outputs.publish(kStatus, status);
+    }
+  }
+
+  void digest(Digest& digest) const override {
+    if (const InsCore* core = filter_->core()) core->digest(digest);
+  }
+
+  [[nodiscard]] std::vector<uint8_t> save() const override {
+    StateWriter writer;
+    writer.put(pose_slot_.last());
+    writer.put(status_slot_.last());
+    const std::vector<uint8_t> filter = filter_->save();
+    writer.put(std::span<const uint8_t>(filter));
+    return writer.take();
+  }
+
+  void load(std::span<const uint8_t> state) override {
+    StateReader reader(state);
+    const auto pose_last = reader.get<int64_t>();
+    const auto status_last = reader.get<int64_t>();
+    std::vector<uint8_t> filter;
+    reader.get(filter);
+    reader.finish();
+    filter_->load(filter);
+    pose_slot_.set_last(pose_last);
+    status_slot_.set_last(status_last);
+  }
+
+  [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+
+ private:
+  GnssInsProcessConfig config_;
+  GnssInsConfig filter_config_;
+  StageSpec spec_;
+  std::optional<GnssIns> filter_;
+  Slot pose_slot_, status_slot_;
+};
+
+template <class T>
+void take(const std::optional<T>& from, T& to) {
+  if (from) to = *from;
+}
+
+}  // namespace
+
+GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
+  GnssInsVehicle v;
+  if (const auto& imu = calibration.sensors.imu) {
+    take(imu->gyro_noise, v.gyro_noise);
+    take(imu->accel_noise, v.accel_noise);
+    take(imu->gyro_bias_std, v.gyro_bias_std);
+    take(imu->accel_bias_std, v.accel_bias_std);
+    take(imu->scale_std, v.scale_std);
+    take(imu->correlation, v.correlation_s);
+    take(imu->time_offset_std, v.time_offset_std);
+  }
+  if (const auto& gnss = calibration.sensors.gnss) {
+    take(gnss->lever_arm, v.p_imu_antenna);
+    take(gnss->position_latency_std, v.position_latency_std);
+    take(gnss->velocity_latency_std, v.velocity_latency_std);
+  }
+  if (const auto& wheels = calibration.sensors.wheels) {
+    take(wheels->speed_scale_std, v.wheel_scale_std);
+    take(wheels->speed_noise, v.wheel_noise);
+    take(wheels->track_width, v.track_width);
+  }
+  if (const auto& mag = calibration.sensors.mag; mag && mag->declination_deg)
+    v.magnetic_declination = *mag->declination_deg * kDegree;
+  if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
+  return v;
+}
+
+std::unique_ptr<Stage> make_gnss_ins_ekf(const Calibration& calibration, const GnssInsProcessConfig& config) {
+  return std::make_unique<GnssInsStage>(calibration, config);
+}
+
+std::unique_ptr<Stage> make_gnss_ins_ekf(const std::filesystem::path& vehicle_dir) {
+  return make_gnss_ins_ekf(load_calibration(vehicle_dir),
+                           load_config_or_defaults<GnssInsProcessConfig>(vehicle_dir / "gnss_ins_ekf.yaml"));
+}
+
+}  // namespace roadfix
