@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace roadfix {
@@ -15,8 +14,8 @@ struct YamlNode {
   int line = 0;         ///< of its first character, counted from 1
   bool quoted = false;  ///< a quoted scalar is text, never a number
   std::string scalar;
-  std::vector<YamlNode> items;                            ///< of a list
-  std::vector<std::pair<std::string, YamlNode>> entries;  ///< of a map, in file order
+  std::vector<std::string> keys;  ///< of a map, in file order
+  std::vector<YamlNode> items;    ///< of a list, or the values of a map
 
   /// The value of a key of a map, or nothing.
   [[nodiscard]] const YamlNode* find(const std::string& key) const;

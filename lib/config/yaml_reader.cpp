@@ -65,9 +65,10 @@ void YamlReader::texts(const char* key, std::vector<std::string>& values) {
 
 void YamlReader::require(const char* key) {
   if (find(key) != nullptr) return;
-  for (const auto& [name, value] : map_.entries) {
-    if (differ_in_unit_only(name, key)) {
-      throw ConfigError(file_, value.line, fmt::format("{} is unknown, did you mean {}?", join(name.c_str()), key));
+  for (std::size_t i = 0; i < map_.keys.size(); ++i) {
+    if (differ_in_unit_only(map_.keys[i], key)) {
+      throw ConfigError(file_, map_.items[i].line,
+                        fmt::format("{} is unknown, did you mean {}?", join(map_.keys[i].c_str()), key));
     }
   }
   throw ConfigError(file_, map_.line, fmt::format("{} is missing", join(key)));
@@ -81,7 +82,8 @@ void YamlReader::check(const char* key, bool ok, const std::string& what) {
 }
 
 void YamlReader::finish() const {
-  for (const auto& [key, value] : map_.entries) {
+  for (std::size_t i = 0; i < map_.keys.size(); ++i) {
+    const std::string& key = map_.keys[i];
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
     const std::string hint = closest_key(key, known_);
     std::string message = join(key.c_str()) + " is unknown";
@@ -90,7 +92,7 @@ void YamlReader::finish() const {
     } else if (!known_.empty()) {
       message += fmt::format("; known here: {}", fmt::join(known_, ", "));
     }
-    throw ConfigError(file_, value.line, message);
+    throw ConfigError(file_, map_.items[i].line, message);
   }
 }
 

@@ -171,7 +171,8 @@ ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& fac
   const auto [begin_us, end_us] = scored_time(reference, facts);
   report.availability = availability(estimate.trajectory, begin_us, end_us);
   if (!estimate.latencies.empty()) report.latency = summarise(estimate.latencies);
-  std::erase_if(estimate.modes, [&](const ModeSample& m) { return m.t_us < begin_us || m.t_us > end_us; });
+  std::erase_if(estimate.modes,
+                [begin = begin_us, end = end_us](const ModeSample& m) { return m.t_us < begin || m.t_us > end; });
   report.modes = mode_accuracy(estimate.modes, reference.trajectory, options.turn_threshold);
 
   take_to_reference_point(estimate);

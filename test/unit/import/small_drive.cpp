@@ -1,12 +1,10 @@
 #include "small_drive.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 #include <zlib.h>
 
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
 
 namespace roadfix::test {
 namespace {
@@ -42,17 +40,6 @@ std::string png_chunk(const std::string& type, const std::string& data) {
 }
 
 }  // namespace
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (fs::temp_directory_path() / "roadfix_test_XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make " + name);
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
-}
 
 void write_file(const fs::path& path, const std::string& text) {
   std::ofstream stream(path, std::ios::binary);

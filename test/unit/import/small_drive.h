@@ -5,20 +5,9 @@
 #include <functional>
 #include <string>
 
+#include "support/temporary_folder.h"
+
 namespace roadfix::test {
-
-/// A new empty folder, removed with everything in it at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder();
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 void write_file(const std::filesystem::path& path, const std::string& text);
 void write_gzip(const std::filesystem::path& path, const std::string& text);
