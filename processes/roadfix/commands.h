@@ -13,5 +13,6 @@ void add_export_command(CLI::App& app);
 void add_import_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
+void add_simulate_command(CLI::App& app);
 
 }  // namespace roadfix

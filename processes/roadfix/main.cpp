@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   roadfix::add_import_command(app);
   roadfix::add_replay_command(app);
   roadfix::add_run_command(app);
+  roadfix::add_simulate_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

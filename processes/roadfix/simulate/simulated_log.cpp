@@ -1,0 +1,185 @@
+#include "roadfix/simulate/simulated_log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <roadfix/config_t.hpp>
+
+#include "bus/log_writer.h"
+#include "bus/message.h"
+#include "config/config.h"
+#include "config/config_hash.h"
+#include "geometry/frames.h"
+#include "roadfix/import/drive_messages.h"
+#include "roadfix/simulate/scenario_file.h"
+
+namespace roadfix {
+namespace {
+
+/// One encoded message on its way into the log.
+struct Event {
+  std::int64_t arrival_us;
+  int channel;  // rank among messages that arrive together
+  std::int64_t seq;
+  std::function<std::vector<uint8_t>()> bytes;
+};
+
+struct EventList {
+  std::vector<std::string> channels;
+  std::vector<std::size_t> counts;
+  std::vector<Event> events;
+  std::int64_t run = 0;
+
+  template <class Message>
+  void add(std::int64_t arrival_us, std::int64_t seq, const std::function<Message()>& make) {
+    ++counts.back();
+    events.push_back({arrival_us, static_cast<int>(channels.size()) - 1, seq, [make, seq, this] {
+                        Message m = make();
+                        m.run = run;
+                        m.seq = seq;
+                        return encode(m);
+                      }});
+  }
+
+  void begin_channel(const std::string& name) {
+    channels.push_back(name);
+    counts.push_back(0);
+  }
+
+  template <class Message, class Sample>
+  void add_sensor(const std::string& name, const std::vector<Sample>& samples,
+                  const std::vector<Delivery>& deliveries) {
+    if (samples.empty()) return;
+    begin_channel(name);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      add<Message>(deliveries[i].arrival_us, deliveries[i].seq, [&samples, i] { return to_message(samples[i]); });
+    }
+  }
+};
+
+void copy(const Eigen::Vector3d& from, double (&to)[3]) { std::copy(from.begin(), from.end(), to); }
+
+pose_t reference_message(const SimulatedDrive& drive, const Odometry& truth) {
+  const Eigen::Vector3d& lever = drive.config.imu.position_m;
+  const Geodetic& anchor = drive.anchor.geodetic();
+  pose_t pose = empty_pose(truth.t_us, ReferenceOf::kImu);
+  pose.frame = pose_t::FRAME_ENU;
+  pose.anchor_lat_deg = anchor.latitude / kDegree;
+  pose.anchor_lon_deg = anchor.longitude / kDegree;
+  pose.anchor_height_m = anchor.height;
+  copy(truth.T_frame_vehicle * lever, pose.position_m);
+  const Eigen::Quaterniond q = truth.T_frame_vehicle.q.w() < 0.0 ? Eigen::Quaterniond(-truth.T_frame_vehicle.q.coeffs())
+                                                                 : truth.T_frame_vehicle.q;
+  pose.q_wxyz[0] = q.w();
+  pose.q_wxyz[1] = q.x();
+  pose.q_wxyz[2] = q.y();
+  pose.q_wxyz[3] = q.z();
+  copy(truth.velocity + truth.angular_rate.cross(lever), pose.velocity_mps);
+  copy(truth.angular_rate, pose.angular_rate_radps);
+  return pose;
+}
+
+config_t config_message(const SimulatedDrive& drive) {
+  config_t config{};
+  config.utime = drive.config.start_utime;
+  config.process = "drive";
+  config.config_yaml = fmt::format("# Simulated with seed {} from this scenario:\n", drive.seed);
+  const std::string scenario = scenario_text(drive.config);
+  for (std::size_t begin = 0; begin < scenario.size();) {
+    const std::size_t end = scenario.find('\n', begin);
+    config.config_yaml += "# " + scenario.substr(begin, end - begin) + "\n";
+    begin = end == std::string::npos ? scenario.size() : end + 1;
+  }
+  config.config_yaml += config_text(facts_of(drive));
+  config.calibration_yaml = calibration_text(calibration_of(drive.config));
+  config.config_hash = config_hash(config.config_yaml, config.calibration_yaml);
+  return config;
+}
+
+}  // namespace
+
+Calibration calibration_of(const ScenarioConfig& config) {
+  const ImuConfig& imu = config.imu;
+  Calibration c;
+  c.body_origin = BodyOrigin::kImu;
+  c.mounting = MountingCalibration{Eigen::Vector3d(imu.mounting_std_rad / kDegree)};
+  c.sensors.imu = ImuCalibration{
+      imu.rate_hz,
+      imu.gyro_noise_radps_per_rthz,
+      imu.accel_noise_mps2_per_rthz,
+      std::hypot(imu.gyro_bias_std_radps, imu.gyro_bias_drift_std_radps),
+      std::hypot(imu.accel_bias_std_mps2, imu.accel_bias_drift_std_mps2),
+      std::max(imu.gyro_scale_std, imu.accel_scale_std),
+      imu.bias_correlation_s,
+      std::abs(imu.link.clock_offset_s),
+  };
+  const GnssConfig& gnss = config.gnss;
+  if (gnss.rate_hz > 0.0) {
+    c.sensors.gnss =
+        GnssCalibration{gnss.rate_hz, Eigen::Vector3d(gnss.lever_arm_m - imu.position_m), HeightKind::kEllipsoid,
+                        std::abs(gnss.position_latency_s), std::abs(gnss.velocity_latency_s)};
+  }
+  const WheelsConfig& wheels = config.wheels;
+  if (wheels.layout != WheelLayout::kNone) {
+    c.sensors.wheels = WheelsCalibration{wheels.rate_hz, std::hypot(wheels.speed_scale_std, wheels.wheel_scale_std),
+                                         wheels.speed_noise_mps, wheels.track_width_m};
+  }
+  if (config.mag.rate_hz > 0.0) {
+    c.sensors.mag = MagCalibration{config.mag.declination_deg, config.mag.hard_iron_ut, Eigen::Matrix3d::Identity()};
+  }
+  return c;
+}
+
+DriveFacts facts_of(const SimulatedDrive& drive) {
+  DriveFacts facts;
+  facts.name = drive.config.name;
+  facts.first_fix_us = drive.gnss.empty() ? drive.config.start_utime : drive.gnss.front().t_us;
+  facts.reference = {ReferenceOf::kImu, true, true, false, 0.0};
+  if (drive.gnss.empty()) return facts;
+  const auto period_us = static_cast<std::int64_t>(std::llround(1e6 / drive.config.gnss.rate_hz));
+  for (const Fault& f : drive.config.faults) {
+    if (f.sensor != Sensor::kGnss || f.kind != FaultKind::kSilence) continue;
+    // The outage lies between the last fix before the silence and the first one after it.
+    const auto time_us = [&](double t_s) { return drive.config.start_utime + std::llround(t_s * 1e6); };
+    const auto after = std::find_if(drive.deliveries.gnss.begin(), drive.deliveries.gnss.end(),
+                                    [&](const Delivery& d) { return d.true_us >= time_us(f.start_s); });
+    if (after == drive.deliveries.gnss.begin() || after == drive.deliveries.gnss.end()) continue;
+    const std::int64_t first = (after - 1)->true_us + period_us;
+    const std::int64_t last = after->true_us - period_us;
+    if (first <= last) facts.outages.push_back({first, last, after->true_us});
+  }
+  return facts;
+}
+
+std::string write_simulated_log(const SimulatedDrive& drive, const std::filesystem::path& path) {
+  EventList list;
+  list.run = drive.config.start_utime;
+  list.begin_channel("CONFIG_DRIVE");
+  list.add<config_t>(drive.config.start_utime, 0, [&] { return config_message(drive); });
+  list.add_sensor<gnss_t>("GNSS", drive.gnss, drive.deliveries.gnss);
+  list.add_sensor<imu_t>("IMU", drive.imu, drive.deliveries.imu);
+  list.add_sensor<mag_t>("MAG", drive.mag, drive.deliveries.mag);
+  list.begin_channel("REFERENCE");
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    list.add<pose_t>(drive.truth[i].t_us, static_cast<std::int64_t>(i),
+                     [&drive, i] { return reference_message(drive, drive.truth[i]); });
+  }
+  list.add_sensor<wheels_t>("WHEELS", drive.wheels, drive.deliveries.wheels);
+  std::stable_sort(list.events.begin(), list.events.end(), [](const Event& a, const Event& b) {
+    return a.arrival_us != b.arrival_us ? a.arrival_us < b.arrival_us : a.channel < b.channel;
+  });
+  LogWriter writer(path);
+  for (const Event& e : list.events) {
+    writer.write(list.channels[static_cast<std::size_t>(e.channel)], e.arrival_us, e.bytes());
+  }
+  writer.commit();
+  std::string text;
+  for (std::size_t i = 0; i < list.channels.size(); ++i) {
+    text += fmt::format("  {:<13} {:>8}\n", list.channels[i], list.counts[i]);
+  }
+  return text;
+}
+
+}  // namespace roadfix

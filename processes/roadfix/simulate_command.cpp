@@ -1,0 +1,95 @@
+// roadfix simulate: drives whose truth is known, as logs.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <iostream>
+#include <memory>
+
+#include "roadfix/commands.h"
+#include "roadfix/import/drive_log.h"
+#include "roadfix/simulate/scenario_file.h"
+#include "roadfix/simulate/simulated_log.h"
+#include "simulation/scenarios.h"
+
+namespace roadfix {
+namespace {
+
+struct Options {
+  std::string scenario;
+  std::uint64_t seed = 1;
+  std::filesystem::path out;
+  std::filesystem::path vehicle;
+  double duration_s = 0.0;
+  std::vector<std::string> faults;
+  bool list = false;
+  bool print_config = false;
+  bool overwrite = false;
+  bool timing = false;
+};
+
+void print_list() {
+  std::cout << "scenarios:\n";
+  for (const std::string& name : scenario_names()) {
+    std::cout << fmt::format("  {:<18} {:>5.0f} s  {}\n", name, scenario(name).duration_s, scenario_summary(name));
+  }
+  std::cout << "faults, as --fault NAME@START[+DURATION][:KEY=VALUE,...], times in s:\n";
+  for (const FaultType& type : fault_types()) {
+    std::string keys;
+    for (const FaultParameter& p : type.parameters) keys += fmt::format(" {}={}", p.key, p.fallback);
+    std::cout << fmt::format("  {:<18} {}{}\n", type.name, type.does, keys.empty() ? "" : ";" + keys);
+  }
+}
+
+ScenarioConfig configured(const Options& options) {
+  if (options.scenario.empty()) throw std::runtime_error("simulate: which scenario? (--list shows all)");
+  ScenarioConfig config = load_scenario(options.scenario);
+  if (options.duration_s > 0.0) config.duration_s = options.duration_s;
+  for (const std::string& text : options.faults) config.faults.push_back(parse_fault(text));
+  return config;
+}
+
+void run(const Options& options) {
+  if (options.list) return print_list();
+  const ScenarioConfig config = configured(options);
+  if (options.print_config) {
+    std::cout << scenario_text(config);
+    return;
+  }
+  if (options.out.empty()) throw std::runtime_error("simulate: --out DRIVE.lcm is missing");
+  const auto begin = std::chrono::steady_clock::now();
+  const SimulatedDrive drive = simulate(config, options.seed);
+  if (!options.vehicle.empty()) {
+    write_vehicle(calibration_of(config), config.name, options.vehicle, options.overwrite);
+  }
+  const std::string summary = write_simulated_log(drive, options.out);
+  const double taken_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::cout << options.out.string() << ": " << config.name << ", seed " << options.seed << "\n" << summary;
+  if (!options.vehicle.empty()) std::cout << "vehicle: " << options.vehicle.string() << "\n";
+  if (options.timing) {
+    std::cout << fmt::format("{:.0f} s simulated and written in {:.2f} s: {:.0f} x real time\n", config.duration_s,
+                             taken_s, config.duration_s / taken_s);
+  }
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("simulate", "Make a drive log whose truth is known exactly");
+  command->add_option("scenario", options->scenario, "name of a scenario, or a YAML file");
+  command->add_option("--seed", options->seed, "of every random number")->capture_default_str();
+  command->add_option("--out", options->out, "the log to write");
+  command->add_option("--vehicle", options->vehicle, "folder for calibration.yaml");
+  command->add_option("--duration", options->duration_s, "s, in place of the scenario's own")
+      ->check(CLI::Range(1.0, 86400.0));
+  command->add_option("--fault", options->faults, "NAME@START[+DURATION][:KEY=VALUE,...]; may be given again")
+      ->allow_extra_args(false);
+  command->add_flag("--list", options->list, "show scenarios and faults");
+  command->add_flag("--print-config", options->print_config, "show the scenario's values as YAML");
+  command->add_flag("--overwrite", options->overwrite, "replace a calibration.yaml that differs");
+  command->add_flag("--timing", options->timing, "say how long it took");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace roadfix

@@ -1,0 +1,138 @@
+#include "roadfix/simulate/simulated_log.h"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <roadfix/config_t.hpp>
+#include <roadfix/gnss_t.hpp>
+#include <roadfix/imu_t.hpp>
+#include <roadfix/pose_t.hpp>
+
+#include "bus/log_reader.h"
+#include "bus/message.h"
+#include "config/config.h"
+#include "roadfix/simulate/scenario_file.h"
+#include "simulation/scenarios.h"
+#include "support/shared_data.h"
+#include "support/temporary_folder.h"
+
+namespace roadfix {
+namespace {
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+SimulatedDrive short_drive(const std::string& fault = "") {
+  ScenarioConfig config = scenario("demo");
+  config.duration_s = 70.0;
+  if (!fault.empty()) config.faults.push_back(parse_fault(fault));
+  return simulate(config, 5);
+}
+
+template <class Message>
+std::vector<Message> messages(const std::filesystem::path& path, const std::string& channel) {
+  std::vector<Message> out;
+  LogReader reader(path);
+  while (const auto event = reader.next()) {
+    if (event->channel == channel) out.push_back(decode<Message>(event->data));
+  }
+  return out;
+}
+
+TEST_CASE("the same drive gives the same bytes, another seed others") {
+  const test::TemporaryFolder folder;
+  write_simulated_log(short_drive(), folder / "a.lcm");
+  write_simulated_log(short_drive(), folder / "b.lcm");
+  ScenarioConfig config = scenario("demo");
+  config.duration_s = 70.0;
+  write_simulated_log(simulate(config, 6), folder / "c.lcm");
+  CHECK(bytes_of(folder / "a.lcm") == bytes_of(folder / "b.lcm"));
+  CHECK(bytes_of(folder / "a.lcm") != bytes_of(folder / "c.lcm"));
+}
+
+TEST_CASE("the log lies in order of arrival, its messages carry their own time") {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path path = folder / "drive.lcm";
+  const SimulatedDrive drive = short_drive("imu.delay@10+5:jitter_s=0.05");
+  write_simulated_log(drive, path);
+  LogReader reader(path);
+  std::int64_t newest = 0;
+  std::int64_t newest_imu = 0;
+  int out_of_order = 0;
+  std::size_t imu = 0;
+  bool first = true;
+  while (const auto event = reader.next()) {
+    CHECK((first == (event->channel == "CONFIG_DRIVE")));
+    first = false;
+    CHECK(event->timestamp_us >= newest);
+    newest = event->timestamp_us;
+    if (event->channel != "IMU") continue;
+    const std::int64_t utime = decode<imu_t>(event->data).utime;
+    out_of_order += utime < newest_imu ? 1 : 0;
+    newest_imu = std::max(newest_imu, utime);
+    ++imu;
+  }
+  CHECK(reader.damage().empty());
+  CHECK(imu == drive.imu.size());
+  CHECK(out_of_order > 20);
+}
+
+TEST_CASE("REFERENCE is the truth at the imu") {
+  const test::TemporaryFolder folder;
+  ScenarioConfig config = scenario("city_loop");
+  config.duration_s = 60.0;
+  config.imu.position_m = {1.0, 0.2, 0.5};
+  const SimulatedDrive drive = simulate(config, 5);
+  write_simulated_log(drive, folder / "drive.lcm");
+  const auto reference = messages<pose_t>(folder / "drive.lcm", "REFERENCE");
+  REQUIRE(reference.size() == 601);
+  for (const pose_t& pose : reference) {
+    const Odometry truth = drive.truth_at(pose.utime);
+    const Eigen::Vector3d p = truth.T_frame_vehicle * config.imu.position_m;
+    const Eigen::Vector3d v = truth.velocity + truth.angular_rate.cross(config.imu.position_m);
+    REQUIRE((p - Eigen::Map<const Eigen::Vector3d>(pose.position_m)).norm() < 1e-12);
+    REQUIRE((v - Eigen::Map<const Eigen::Vector3d>(pose.velocity_mps)).norm() < 1e-12);
+    REQUIRE((truth.angular_rate - Eigen::Map<const Eigen::Vector3d>(pose.angular_rate_radps)).norm() < 1e-12);
+    REQUIRE(std::abs(truth.T_frame_vehicle.q.coeffs().dot(
+                Eigen::Vector4d(pose.q_wxyz[1], pose.q_wxyz[2], pose.q_wxyz[3], pose.q_wxyz[0]))) > 1.0 - 1e-12);
+    REQUIRE(pose.validity == pose_t::VALIDITY_VALID);
+  }
+}
+
+TEST_CASE("the silence of the receiver is an outage of the facts") {
+  const SimulatedDrive drive = short_drive();
+  const DriveFacts facts = facts_of(drive);
+  REQUIRE(facts.outages.size() == 1);
+  const std::int64_t start = drive.config.start_utime;
+  CHECK(facts.outages[0].first_withheld_us - start == 30'000'000);
+  CHECK(facts.outages[0].last_withheld_us - start == 59'750'000);
+  CHECK(facts.outages[0].return_us - start == 60'000'000);
+}
+
+TEST_CASE("CONFIG_DRIVE carries facts, calibration and the scenario with its seed") {
+  const test::TemporaryFolder folder;
+  const SimulatedDrive drive = short_drive();
+  write_simulated_log(drive, folder / "drive.lcm");
+  const auto config = messages<config_t>(folder / "drive.lcm", "CONFIG_DRIVE");
+  REQUIRE(config.size() == 1);
+  CHECK_THAT(config[0].config_yaml, Catch::Matchers::Contains("seed 5"));
+  CHECK(parse_config<DriveFacts>(config[0].config_yaml, "facts").outages.size() == 1);
+  const Calibration calibration = parse_calibration(config[0].calibration_yaml, "calibration");
+  CHECK(calibration.sensors.gnss->lever_arm == drive.config.gnss.lever_arm_m);
+  CHECK(calibration.sensors.imu->gyro_noise == drive.config.imu.gyro_noise_radps_per_rthz);
+}
+
+TEST_CASE("logs/demo.lcm and configs/demo are what their command makes") {
+  const test::TemporaryFolder folder;
+  const ScenarioConfig config = load_scenario("demo");
+  write_simulated_log(simulate(config, 1), folder / "demo.lcm");
+  CHECK(bytes_of(folder / "demo.lcm") == bytes_of(test::source_path("logs/demo.lcm")));
+  CHECK(calibration_text(load_calibration(test::source_path("configs/demo"))) ==
+        calibration_text(calibration_of(config)));
+}
+
+}  // namespace
+}  // namespace roadfix
