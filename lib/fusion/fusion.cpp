@@ -1,0 +1,177 @@
+#include "fusion/fusion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/euler.h"
+#include "geometry/frames.h"
+#include "geometry/so3.h"
+
+namespace roadfix {
+
+using namespace fusion;
+
+namespace {
+
+constexpr double kUnknownPosition = 1e-3;  ///< m: a local frame begins where it begins
+constexpr double kLongestStep = 0.1;       ///< s, of the motion models; longer silences go in several
+
+bool usable(const Odometry& o) {
+  return o.T_frame_vehicle.p.allFinite() && std::abs(o.T_frame_vehicle.q.norm() - 1.0) < 1e-3 &&
+         o.velocity.allFinite() && o.angular_rate.allFinite() && o.cov_pose.allFinite() && o.cov_velocity.allFinite() &&
+         o.cov_pose.diagonal().minCoeff() >= 0.0;
+}
+
+}  // namespace
+
+Fusion::Fusion(const FusionConfig& config) : config_(config) {}
+
+ChannelSlots Fusion::slots(FusionChannel c) {
+  switch (c) {
+    case FusionChannel::kVo:
+      return {kVoClone, kVoScale, kVoDrift};
+    case FusionChannel::kWheel:
+      return {kWheelClone, kWheelScale, kWheelDrift};
+    case FusionChannel::kIns:
+      break;
+  }
+  return {kInsClone, std::nullopt, std::nullopt};
+}
+
+double Fusion::timeout(FusionChannel c) const {
+  if (c == FusionChannel::kIns) return config_.ins_timeout;
+  return c == FusionChannel::kVo ? config_.vo_timeout : config_.wheel_timeout;
+}
+
+const MotionFloor& Fusion::floor(FusionChannel c) const {
+  if (c == FusionChannel::kIns) return config_.ins_floor;
+  return c == FusionChannel::kVo ? config_.vo_floor : config_.wheel_floor;
+}
+
+bool Fusion::alive(FusionChannel c) const {
+  return memory(c).alive_us && seconds_between(*memory(c).alive_us, t_us_) < timeout(c);
+}
+
+void Fusion::set_gnss(int64_t t_us, bool present) {
+  gnss_ = present;
+  ::roadfix::set_gnss(ramp_, config_.adaptive, t_us, present);
+}
+
+FuseStatus Fusion::add(const ChannelSample& s) {
+  ChannelReport& report = reports_[static_cast<std::size_t>(s.channel)];
+  report.nis = 0.0;
+  report.dof = 0;
+  report.gate = config_.gate;
+  const auto done = [&](FuseStatus status) { return report.status = status; };
+  if (!usable(s.odometry)) return done(FuseStatus::kBadInput);
+  if (started_ && s.odometry.t_us < t_us_) return done(FuseStatus::kNotReady);
+  const bool good = s.odometry.validity != Validity::kInvalid;
+  if (!started_ && !good) return done(FuseStatus::kBadQuality);
+  if (!started_) start(s);
+
+  const FusionEstimate before = now_;
+  advance(s.odometry.t_us);
+  if (!good) {
+    follow_local(before);
+    memory(s.channel).last.reset();
+    if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
+    return done(FuseStatus::kBadQuality);
+  }
+  memory(s.channel).alive_us = report.last_us = t_us_;
+  const double known = now_.P.block<2, 2>(kPos, kPos).trace();
+  const FuseStatus status = fuse(s, before, report);
+  if (s.channel == FusionChannel::kVo) update_tie(s);
+  remember(s);
+  reweigh(imm_);
+  now_ = combine(imm_);
+  weigh(s.channel, std::max(0.0, known / now_.P.block<2, 2>(kPos, kPos).trace() - 1.0));
+  return done(status);
+}
+
+FuseStatus Fusion::fuse(const ChannelSample& s, const FusionEstimate& before, ChannelReport& report) {
+  if (s.channel == FusionChannel::kIns && !placed_) {
+    follow_local(before);
+    place(s.odometry);
+    return FuseStatus::kAccepted;
+  }
+  if (config_.scheme == FusionScheme::kLiteral) {
+    follow_local(before);
+    return fuse_literal(s, report);
+  }
+  move_height(s);
+  FuseStatus status = fuse_motion(s, report);
+  now_ = combine(imm_);
+  fuse_rates(s);
+  now_ = combine(imm_);
+  follow_local(before);
+  if (s.channel == FusionChannel::kIns) status = fuse_gain(s, report);
+  return status;
+}
+
+/// The first sample: position, yaw and speed as it says; a channel without enu gives a local frame only.
+void Fusion::start(const ChannelSample& s) {
+  t_us_ = s.odometry.t_us;
+  attitude_ = s.odometry;
+  FusionEstimate e;
+  const bool enu = s.channel == FusionChannel::kIns;
+  if (enu) {
+    e.x.segment<3>(kPos) = planar_pose(s.odometry);
+    e.P.block<3, 3>(kPos, kPos) = planar_covariance(s.odometry);
+    height_ = s.odometry.T_frame_vehicle.p.z();
+    height_variance_ = s.odometry.cov_pose(2, 2);
+  } else {
+    for (int i = 0; i < 2; ++i) set_independent(e, kPos + i, 0.0, kUnknownPosition);
+    set_independent(e, kYaw, 0.0, kUnknownPosition);
+    height_ = 0.0;
+    height_variance_ = kUnknownPosition * kUnknownPosition;
+  }
+  set_independent(e, kSpeed, s.odometry.velocity.x(), std::sqrt(s.odometry.cov_velocity(0, 0)) + 0.1);
+  set_independent(e, kAccel, 0.0, 2.0);
+  set_independent(e, kTurn, s.odometry.angular_rate.z(), 0.1);
+  set_independent(e, kVoScale, 0.0, config_.vo_scale_std);
+  set_independent(e, kVoDrift, 0.0, config_.vo_drift_std);
+  set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
+  set_independent(e, kWheelDrift, 0.0, config_.wheel_drift_std);
+  for (const int clone : {int{kInsClone}, int{kVoClone}, int{kWheelClone}}) clone_pose(e, clone);
+  for (Mode& mode : imm_.modes) mode.estimate = e;
+  now_ = e;
+  started_ = true;
+  placed_ = enu;
+}
+
+/// The first enu pose of a fusion that runs in a local frame: position and yaw are taken over, what was learnt stays.
+void Fusion::place(const Odometry& o) {
+  for (Mode& mode : imm_.modes) {
+    FusionEstimate& e = mode.estimate;
+    for (int i = 0; i < 3; ++i) set_independent(e, kPos + i, planar_pose(o)(i), 1.0);
+    e.P.block<3, 3>(kPos, kPos) = planar_covariance(o);
+    for (const int clone : {int{kInsClone}, int{kVoClone}, int{kWheelClone}}) clone_pose(e, clone);
+  }
+  for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) memory(c).last.reset();
+  height_ = o.T_frame_vehicle.p.z();
+  height_variance_ = o.cov_pose(2, 2);
+  now_ = combine(imm_);
+  tie_.forget();
+  placed_ = true;
+}
+
+/// Mixing and prediction to t_us, in steps that the models are good for.
+void Fusion::advance(int64_t t_us) {
+  const double total = seconds_between(t_us_, t_us);
+  if (total <= 0.0) {
+    for (Mode& mode : imm_.modes) mode.log_likelihood = 0.0;
+    return;
+  }
+  const int steps = std::min(100, 1 + static_cast<int>(total / kLongestStep));
+  const double dt = total / steps;
+  const Eigen::Matrix2d transition = mode_transition(dt, {config_.straight_duration, config_.turn_duration});
+  for (int i = 0; i < steps; ++i) {
+    mix(imm_, transition);
+    predict(imm_, config_.motion, dt);
+  }
+  let_return(comeback_, config_.comeback, total);
+  now_ = combine(imm_);
+  t_us_ = t_us;
+}
+
+}  // namespace roadfix

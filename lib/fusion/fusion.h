@@ -1,0 +1,163 @@
+/// One pose from GNSS/INS, vision and wheels: an IMM of two motion models (paper C), fed by relative motion and by what
+/// absolute poses gained. Derivation: lib/fusion/MODEL.md.
+///
+/// Frames: enu for POSE_INS and POSE_FUSED; vo and wheel are the estimators' own level frames; local starts where the
+/// fusion started. Samples come in the order of their times. The same inputs in the same order give the same bits.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "fusion/frame_tie.h"
+#include "fusion/fusion_config.h"
+#include "fusion/imm.h"
+#include "fusion/measurement.h"
+#include "samples/samples.h"
+#include "stream/state_bytes.h"
+
+namespace roadfix {
+
+enum class FusionChannel { kIns = 0, kVo = 1, kWheel = 2 };
+inline constexpr int kFusionChannels = 3;
+
+struct ChannelSample {
+  FusionChannel channel = FusionChannel::kIns;
+  Odometry odometry;
+  int reset_counter = 0;
+  bool metric = true;       ///< false: lengths are up to a common factor
+  bool shares_imu = false;  ///< its yaw comes from the gyro that the INS uses
+  int64_t seq = 0;
+};
+
+enum class FuseStatus { kAccepted, kGated, kNotReady, kBadInput, kBadQuality, kReset, kDisabled };
+
+struct ChannelReport {
+  FuseStatus status = FuseStatus::kNotReady;
+  double weight = 0.0;  ///< share of the information gained lately, [0, 1]
+  double alpha = 1.0;   ///< on the channel's own covariance
+  double nis = 0.0;     ///< of the last attempt
+  int dof = 0;
+  double gate = 0.0;
+  std::optional<int64_t> last_us;
+};
+
+struct VisionRestart {
+  SE3 T_vo_vehicle;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Matrix6d cov_pose = Matrix6d::Zero();
+  std::string reason;
+};
+
+enum class FusionPhase { kWaiting, kRunning, kWeak, kLost };
+
+struct FusionReport {
+  FusionPhase phase = FusionPhase::kWaiting;
+  Validity validity = Validity::kInvalid;  ///< of the ENU pose
+  Validity local_validity = Validity::kInvalid;
+  std::string reason;
+  int reset_counter = 0;
+  Planar last_jump = Planar::Zero();
+};
+
+class Fusion {
+ public:
+  explicit Fusion(const FusionConfig& config);
+
+  /// What the INS says about GNSS: present (aided by it lately) or lost. For ramps, tie and status.
+  void set_gnss(int64_t t_us, bool present);
+
+  /// Fuses one sample; the state moves to its time. Older samples are refused.
+  FuseStatus add(const ChannelSample& sample);
+
+  [[nodiscard]] int64_t t_us() const { return t_us_; }
+  [[nodiscard]] Odometry fused() const;  ///< POSE_FUSED, enu
+  [[nodiscard]] Odometry local() const;  ///< POSE_LOCAL: never jumps
+  [[nodiscard]] FusionReport report() const;
+  [[nodiscard]] const ChannelReport& channel(FusionChannel c) const { return reports_[static_cast<std::size_t>(c)]; }
+  [[nodiscard]] const Imm& imm() const { return imm_; }
+  [[nodiscard]] const FusionEstimate& estimate() const { return now_; }
+  [[nodiscard]] const FrameTie& tie() const { return tie_; }
+  [[nodiscard]] bool tie_frozen() const { return !gnss_; }
+  /// Once per request: vision disagrees and should start again at this pose.
+  [[nodiscard]] std::optional<VisionRestart> take_restart();
+  [[nodiscard]] const FusionConfig& config() const { return config_; }
+
+  void save(StateWriter& writer) const;
+  void load(StateReader& reader);
+
+ private:
+  /// What is remembered of a channel.
+  struct Memory {
+    std::optional<Odometry> last;  ///< at the clone
+    int reset_counter = 0;
+    bool shares_imu = false;
+    double yaw_rate_variance = 0.0;  ///< rad2/s, of its motion lately: which of two that share a gyro is better
+    std::optional<int64_t> alive_us;
+    ConsistencyCheck check;
+  };
+
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visitor);
+
+  [[nodiscard]] Memory& memory(FusionChannel c) { return memories_[static_cast<std::size_t>(c)]; }
+  [[nodiscard]] const Memory& memory(FusionChannel c) const { return memories_[static_cast<std::size_t>(c)]; }
+  [[nodiscard]] bool alive(FusionChannel c) const;
+  [[nodiscard]] double timeout(FusionChannel c) const;
+  [[nodiscard]] const MotionFloor& floor(FusionChannel c) const;
+  [[nodiscard]] static ChannelSlots slots(FusionChannel c);
+
+  void start(const ChannelSample& sample);
+  void place(const Odometry& o);
+  void advance(int64_t t_us);
+  FuseStatus fuse(const ChannelSample& sample, const FusionEstimate& before, ChannelReport& report);
+  FuseStatus fuse_literal(const ChannelSample& sample, ChannelReport& report);
+  FuseStatus fuse_motion(const ChannelSample& sample, ChannelReport& report);
+  [[nodiscard]] Planar motion_of(const ChannelSample& sample, const Odometry& last) const;
+  [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
+  void fuse_rates(const ChannelSample& sample);
+  FuseStatus fuse_gain(const ChannelSample& sample, ChannelReport& report);
+  void apply_gain(const Measurement<3>& gain);
+  void give_way(const Planar& difference);
+  void remember(const ChannelSample& sample);
+  void move_height(const ChannelSample& sample);
+  void gain_height(const Odometry& o);
+  void follow_local(const FusionEstimate& before);
+  void update_tie(const ChannelSample& sample);
+  void ask_restart(const char* reason);
+  void weigh(FusionChannel c, double information);
+  [[nodiscard]] bool better_yaw_elsewhere(const ChannelSample& sample, double yaw_rate_variance) const;
+  template <int M, class At>
+  double update(const At& at);  ///< at(x): the measurement linearised there; returns the mean NIS
+
+  FusionConfig config_;
+  bool started_ = false;
+  bool placed_ = false;  ///< the planar state is in enu
+  int64_t t_us_ = 0;
+  Imm imm_;
+  FusionEstimate now_;  ///< combined
+  std::array<Memory, kFusionChannels> memories_;
+  std::array<ChannelReport, kFusionChannels> reports_;
+  std::array<double, kFusionChannels> information_{};
+  double height_ = 0.0;           ///< m
+  double height_variance_ = 1.0;  ///< m2
+  Odometry attitude_;             ///< newest roll and pitch, with their covariance
+  bool gnss_ = false;
+  DropoutRamp ramp_;
+  FrameTie tie_;
+  Agreement agreement_;
+  std::optional<VisionRestart> restart_;
+  std::optional<int64_t> restart_us_;
+  std::optional<int64_t> refused_since_us_;
+  std::optional<int64_t> last_fix_us_;
+  std::optional<int64_t> last_tie_us_;
+  bool vo_scale_open_ = true;  ///< a non-metric vision's scale has no value yet
+  ReturnState comeback_;
+  Planar local_ = Planar::Zero();
+  double local_height_ = 0.0;
+  Eigen::Matrix3d local_covariance_ = Eigen::Matrix3d::Zero();
+  double local_height_variance_ = 0.0;
+};
+
+}  // namespace roadfix

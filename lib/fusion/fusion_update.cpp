@@ -1,0 +1,281 @@
+// How the fusion uses a sample (MODEL.md, sections 4 and 5).
+#include <algorithm>
+#include <cmath>
+
+#include "fusion/fusion.h"
+#include "geometry/euler.h"
+#include "geometry/so3.h"
+
+namespace roadfix {
+
+using namespace fusion;
+
+namespace {
+
+constexpr double kWeightSmoothing = 0.05;  ///< share of the newest use in a channel's weight
+constexpr double kScaleBase = 1.0;         ///< m, motion from which a non-metric scale is taken
+constexpr double kFirstScaleSigma = 0.2;   ///< of that scale
+constexpr double kFixSpacing = 0.05;       ///< s: corrections closer than this belong to one fix
+constexpr double kTieSpacing = 1.0;  ///< s: the tie's comparisons are that far apart, for their errors' correlation
+constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
+
+/// Yaw rate of the level axes.
+double level_turn(const Odometry& o) {
+  const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
+  return (o.angular_rate.y() * std::sin(a.roll) + o.angular_rate.z() * std::cos(a.roll)) / std::cos(a.pitch);
+}
+
+}  // namespace
+
+template <int M, class At>
+double Fusion::update(const At& at) {
+  double nis = 0.0;
+  for (std::size_t i = 0; i < kModes; ++i) {
+    Mode& mode = imm_.modes[i];
+    const Measurement<M> m = at(mode.estimate.x);
+    const Innovation innovation = kalman_update<M>(mode.estimate, m.H, m.innovation, m.R);
+    mode.log_likelihood += innovation.log_likelihood;
+    nis += imm_.probability(static_cast<Eigen::Index>(i)) * innovation.nis;
+  }
+  return nis;
+}
+
+/// Motion since the last use. Where the INS corrected itself in between, its velocities tell the motion without the
+/// jump.
+Planar Fusion::motion_of(const ChannelSample& s, const Odometry& last) const {
+  const Planar motion = motion_between(planar_pose(last), planar_pose(s.odometry));
+  if (s.channel != FusionChannel::kIns) return motion;
+  const Planar felt = motion_by_velocity(last, s.odometry);
+  const double tolerance = config_.jump_tolerance;
+  const bool jumped = (motion - felt).head<2>().norm() > tolerance || std::abs(motion.z() - felt.z()) > 0.2 * tolerance;
+  return jumped ? felt : motion;
+}
+
+/// A vision without scale takes the first one from what the others say of the same motion.
+bool Fusion::scale_is_open(const ChannelSample& s, const Planar& motion) {
+  if (s.metric || !vo_scale_open_ || s.channel != FusionChannel::kVo) return false;
+  const double length = motion_between(now_.x.segment<3>(kVoClone), now_.x.segment<3>(kPos)).head<2>().norm();
+  const double measured = motion.head<2>().norm();
+  if (length < kScaleBase || !(measured > 0.0)) return true;
+  for (Mode& mode : imm_.modes) set_independent(mode.estimate, kVoScale, std::log(measured / length), kFirstScaleSigma);
+  vo_scale_open_ = false;
+  return true;
+}
+
+/// Two channels that integrate the same gyro are not two witnesses of the yaw: the better one speaks.
+bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const {
+  const FusionChannel other = s.channel == FusionChannel::kIns ? FusionChannel::kVo : FusionChannel::kIns;
+  const bool shared = s.channel == FusionChannel::kIns ? memory(other).shares_imu : s.shares_imu;
+  return shared && alive(other) && memory(other).last && agreement_.agrees &&
+         memory(other).yaw_rate_variance < variance;
+}
+
+FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
+  Memory& m = memory(s.channel);
+  m.shares_imu = s.shares_imu;
+  // Wheels and imu are in the INS already.
+  if (s.channel == FusionChannel::kWheel && alive(FusionChannel::kIns)) {
+    m.last.reset();
+    return FuseStatus::kDisabled;
+  }
+  if (m.last && m.reset_counter != s.reset_counter) {
+    m.last.reset();
+    if (s.channel == FusionChannel::kVo) {
+      agreement_ = Agreement{};
+      vo_scale_open_ = true;
+      tie_.forget();
+    }
+  }
+  if (!m.last) return FuseStatus::kNotReady;
+  const double dt = seconds_between(m.last->t_us, t_us_);
+  if (dt <= 0.0) return FuseStatus::kNotReady;
+  const Planar motion = motion_of(s, *m.last);
+  if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
+
+  const MotionFloor& f = floor(s.channel);
+  const double sigma = f.position * std::sqrt(dt) + f.share * motion.head<2>().norm();
+  Eigen::Matrix3d R = motion_covariance(planar_pose(*m.last), planar_covariance(*m.last), motion,
+                                        planar_covariance(s.odometry), {sigma, sigma, f.yaw * std::sqrt(dt)});
+  m.yaw_rate_variance = R(2, 2) / dt;
+  if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
+    R.row(2).setZero();
+    R.col(2).setZero();
+    R(2, 2) = kUninformative;
+  }
+  const ChannelSlots where = slots(s.channel);
+  if (s.channel == FusionChannel::kVo) {
+    const Measurement<3> at = relative_motion(now_.x, where, motion, dt, R);
+    const double distance = squared_distance<3>(now_, at.H, at.innovation, at.R);
+    compare(agreement_, config_.agreement, distance);
+    report.nis = distance;
+    report.dof = 3;
+    if (!agreement_.agrees) ask_restart("vision disagrees with wheels and imu");
+    if (!agreement_.agrees || distance > config_.gate) return FuseStatus::kGated;
+  }
+  report.nis = update<3>([&](const Vector& x) { return relative_motion(x, where, motion, dt, R); });
+  report.dof = 3;
+  return FuseStatus::kAccepted;
+}
+
+/// Speed and yaw rate: of the INS, or while it is silent of who is there.
+void Fusion::fuse_rates(const ChannelSample& s) {
+  if (s.channel != FusionChannel::kIns && alive(FusionChannel::kIns)) return;
+  if (s.channel == FusionChannel::kVo && !agreement_.agrees) return;
+  const double turn = level_turn(s.odometry);
+  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, turn, config_.turn_sigma); });
+  if (!s.metric) return;
+  const double variance = s.odometry.cov_velocity(0, 0);
+  const std::optional<Measurement<1>> gain =
+      gained_component(now_, kSpeed, s.odometry.velocity.x(), variance, config_.least_gain);
+  if (!gain) return;
+  const double mean = now_.x(kSpeed);
+  update<1>([&](const Vector& x) {
+    Measurement<1> m = *gain;
+    m.innovation(0) += mean - x(kSpeed);
+    return m;
+  });
+}
+
+FuseStatus Fusion::fuse_gain(const ChannelSample& s, ChannelReport& report) {
+  const Planar pose = planar_pose(s.odometry);
+  const Eigen::Matrix3d P_pose = planar_covariance(s.odometry);
+  gain_height(s.odometry);
+  std::optional<Measurement<3>> gain = gained_pose(now_, pose, P_pose, config_.least_gain);
+  if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
+
+  const Measurement<3> plain = absolute_pose(now_.x, pose, P_pose);
+  report.nis = squared_distance<3>(now_, plain.H, plain.innovation, plain.R);
+  report.dof = 3;
+  FuseStatus status = FuseStatus::kAccepted;
+  if (report.nis > config_.gate) {
+    refuse_fix(comeback_);
+    if (!refused_since_us_) refused_since_us_ = t_us_;
+    if (seconds_between(*refused_since_us_, t_us_) < config_.refusal_timeout) return FuseStatus::kGated;
+    give_way(plain.innovation);
+    gain = gained_pose(now_, pose, P_pose, config_.least_gain);
+    status = FuseStatus::kReset;
+  }
+  refused_since_us_.reset();
+  if (gain) apply_gain(*gain);
+  return status;
+}
+
+void Fusion::apply_gain(const Measurement<3>& gain) {
+  const FusionEstimate before = now_;
+  update<3>([&](const Vector& x) {
+    Measurement<3> m = gain;
+    m.innovation += gain.H * difference(before.x, x);
+    return m;
+  });
+  now_ = combine(imm_);
+  const Planar correction = difference(now_.x, before.x).segment<3>(kPos);
+  const bool same_fix = last_fix_us_ && seconds_between(*last_fix_us_, t_us_) < kFixSpacing;
+  if (same_fix) --comeback_.fixes_in_row;
+  take_fix(comeback_, config_.comeback, correction);
+  last_fix_us_ = t_us_;
+}
+
+/// The absolute pose contradicts for so long that the fusion must be wrong: its uncertainty grows to the contradiction.
+void Fusion::give_way(const Planar& difference) {
+  for (Mode& mode : imm_.modes) mode.estimate.P.block<3, 3>(kPos, kPos) += difference * difference.transpose();
+  now_ = combine(imm_);
+}
+
+FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
+  Memory& m = memory(s.channel);
+  const AdaptiveConfig& c = config_.adaptive;
+  Odometry o = s.odometry;
+  if (s.channel == FusionChannel::kWheel) return FuseStatus::kDisabled;
+  if (s.channel == FusionChannel::kVo) {
+    if (!tie_.valid()) return FuseStatus::kNotReady;
+    report.alpha = alpha_vio(c, m.check, ramp_level(ramp_, c, t_us_));
+    const Eigen::Matrix3d R_enu_vo = quaternion({tie_.yaw(), 0.0, 0.0}).toRotationMatrix();
+    o.T_frame_vehicle = tie_.to_enu(o.T_frame_vehicle);
+    o.cov_pose.topRows<3>() = (tie_.scale() * R_enu_vo * o.cov_pose.topRows<3>()).eval();
+    o.cov_pose.leftCols<3>() = (o.cov_pose.leftCols<3>() * R_enu_vo.transpose() * tie_.scale()).eval();
+  } else {
+    report.alpha = alpha_gnss(c, m.check);
+    gain_height(o);
+  }
+  const Eigen::Matrix3d R = scaled_and_clipped(planar_covariance(o), report.alpha, c);
+  const Planar pose = planar_pose(o);
+  const Measurement<3> at = absolute_pose(now_.x, pose, R);
+  report.nis = squared_distance<3>(now_, at.H, at.innovation, at.R);
+  report.dof = 3;
+  report.gate = c.gate;
+  add_nis(m.check, c, report.nis, 3);
+  if (report.nis > c.gate) return FuseStatus::kGated;
+  update<3>([&](const Vector& x) { return absolute_pose(x, pose, R); });
+  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, level_turn(o), config_.turn_sigma); });
+  if (s.channel == FusionChannel::kIns)
+    update<1>([&](const Vector& x) {
+      return absolute_component(x, kSpeed, o.velocity.x(), std::sqrt(o.cov_velocity(0, 0)) + 1e-3);
+    });
+  now_ = combine(imm_);
+  return FuseStatus::kAccepted;
+}
+
+void Fusion::remember(const ChannelSample& s) {
+  Memory& m = memory(s.channel);
+  m.reset_counter = s.reset_counter;
+  if (s.channel == FusionChannel::kIns || !alive(FusionChannel::kIns)) attitude_ = s.odometry;
+  if (s.channel == FusionChannel::kWheel && alive(FusionChannel::kIns)) return;
+  m.last = s.odometry;
+  for (Mode& mode : imm_.modes) clone_pose(mode.estimate, slots(s.channel).clone);
+}
+
+void Fusion::weigh(FusionChannel c, double information) {
+  const auto i = static_cast<std::size_t>(c);
+  information_[i] += kWeightSmoothing * (information - information_[i]);
+  double sum = 0.0;
+  for (const double share : information_) sum += share;
+  for (std::size_t k = 0; k < information_.size(); ++k) reports_[k].weight = sum > 0.0 ? information_[k] / sum : 0.0;
+}
+
+/// The tie follows the vision always, and learns from the fused pose while GNSS is there.
+void Fusion::update_tie(const ChannelSample& s) {
+  const SE3& T_vo_vehicle = s.odometry.T_frame_vehicle;
+  Odometry here = fused();
+  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();
+  cov.topLeftCorner<2, 2>() = now_.P.block<2, 2>(kPos, kPos);
+  cov(2, 2) = height_variance_;
+  cov(3, 3) = now_.P(kYaw, kYaw) + 0.01 * kTieFloor * kTieFloor;
+  cov.diagonal().head<3>().array() += kTieFloor * kTieFloor;
+  const bool known = placed_ && gnss_ && agreement_.agrees;
+  if (!tie_.valid()) {
+    if (!known) return;
+    tie_.start(T_vo_vehicle, here.T_frame_vehicle, cov, config_.tie);
+    last_tie_us_ = t_us_;
+    return;
+  }
+  tie_.move_to(T_vo_vehicle, config_.tie);
+  if (!known || seconds_between(*last_tie_us_, t_us_) < kTieSpacing) return;
+  tie_.correct(T_vo_vehicle, here.T_frame_vehicle, cov);
+  last_tie_us_ = t_us_;
+}
+
+/// Paper B: vision starts again at the pose that the others agree on. Needs the tie, and somebody else who is alive.
+void Fusion::ask_restart(const char* reason) {
+  const bool others = alive(FusionChannel::kIns) || alive(FusionChannel::kWheel);
+  const bool lately = restart_us_ && seconds_between(*restart_us_, t_us_) < config_.restart_every;
+  if (!tie_.valid() || !others || lately) return;
+  const Odometry here = fused();
+  VisionRestart r;
+  r.T_vo_vehicle = tie_.to_vo(here.T_frame_vehicle);
+  r.velocity = here.velocity;
+  const Eigen::Matrix3d R_vo_enu = quaternion({-tie_.yaw(), 0.0, 0.0}).toRotationMatrix() / tie_.scale();
+  r.cov_pose = here.cov_pose;
+  r.cov_pose.topRows<3>() = (R_vo_enu * r.cov_pose.topRows<3>()).eval();
+  r.cov_pose.leftCols<3>() = (r.cov_pose.leftCols<3>() * R_vo_enu.transpose()).eval();
+  r.reason = reason;
+  restart_ = r;
+  restart_us_ = t_us_;
+}
+
+std::optional<VisionRestart> Fusion::take_restart() {
+  std::optional<VisionRestart> taken;
+  taken.swap(restart_);
+  return taken;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,111 @@
+#include "fusion/measurement.h"
+
+#include <cmath>
+
+#include "geometry/so3.h"
+
+namespace roadfix {
+
+using namespace fusion;
+
+namespace {
+
+double length_factor(const Vector& x, const ChannelSlots& slots) {
+  return slots.scale ? std::exp(x(*slots.scale)) : 1.0;
+}
+
+/// z and R that bring a prior of variance p to value `d` away, variance p_new: gain 1 - p_new / p (F.13).
+struct Equivalent {
+  double innovation = 0.0;
+  double variance = 0.0;
+};
+Equivalent equivalent(double d, double p, double p_new) { return {d * p / (p - p_new), p_new * p / (p - p_new)}; }
+
+}  // namespace
+
+Measurement<3> absolute_pose(const Vector& x, const Planar& pose, const Eigen::Matrix3d& R) {
+  Measurement<3> m;
+  m.H.middleCols<3>(kPos).setIdentity();
+  m.innovation = pose - x.segment<3>(kPos);
+  m.innovation.z() = wrap_angle(m.innovation.z());
+  m.R = R;
+  return m;
+}
+
+Measurement<1> absolute_component(const Vector& x, int index, double value, double sigma) {
+  Measurement<1> m;
+  m.H(0, index) = 1.0;
+  m.innovation(0) = value - x(index);
+  m.R(0, 0) = sigma * sigma;
+  return m;
+}
+
+Planar predicted_motion(const Vector& x, const ChannelSlots& slots, double dt) {
+  Planar m = motion_between(x.segment<3>(slots.clone), x.segment<3>(kPos));
+  m.head<2>() *= length_factor(x, slots);
+  if (slots.drift) m.z() = wrap_angle(m.z() + x(*slots.drift) * dt);
+  return m;
+}
+
+Measurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const Planar& motion, double dt,
+                               const Eigen::Matrix3d& R) {
+  const Planar clone = x.segment<3>(slots.clone), now = x.segment<3>(kPos);
+  const Planar predicted = predicted_motion(x, slots, dt);
+  Measurement<3> m;
+  m.H.middleCols<3>(kPos) = motion_by_end(clone);
+  m.H.middleCols<3>(slots.clone) = motion_by_start(clone, now);
+  m.H.topRows<2>() *= length_factor(x, slots);
+  if (slots.scale) m.H.block<2, 1>(0, *slots.scale) = predicted.head<2>();
+  if (slots.drift) m.H(2, *slots.drift) = dt;
+  m.innovation = motion - predicted;
+  m.innovation.z() = wrap_angle(m.innovation.z());
+  m.R = R;
+  return m;
+}
+
+std::optional<Measurement<3>> gained_pose(const FusionEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
+                                          double least_gain) {
+  const Eigen::Matrix3d P = e.P.block<3, 3>(kPos, kPos);
+  const Eigen::LLT<Eigen::Matrix3d> llt(P);
+  if (llt.info() != Eigen::Success || !P_pose.allFinite()) return std::nullopt;
+  // In the axes that make e's covariance the identity, the pose's is diag(lambda).
+  const Eigen::Matrix3d L = llt.matrixL();
+  const Eigen::Matrix3d L_inverse = L.inverse();
+  const Eigen::Matrix3d whitened = L_inverse * P_pose * L_inverse.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * (whitened + whitened.transpose()));
+  const Eigen::Matrix3d to_axes = solver.eigenvectors().transpose() * L_inverse;
+
+  Planar difference = pose - e.x.segment<3>(kPos);
+  difference.z() = wrap_angle(difference.z());
+  const Eigen::Vector3d d = to_axes * difference;
+  Measurement<3> m;
+  bool gained = false;
+  for (int i = 0; i < 3; ++i) {
+    const double lambda = std::max(solver.eigenvalues()(i), 1e-12);
+    m.H.block<1, 3>(i, kPos) = to_axes.row(i);
+    if (lambda < 1.0 - least_gain) {
+      const Equivalent q = equivalent(d(i), 1.0, lambda);
+      m.innovation(i) = q.innovation;
+      m.R(i, i) = q.variance;
+      gained = true;
+    } else {
+      m.R(i, i) = kUninformative;
+    }
+  }
+  if (!gained) return std::nullopt;
+  return m;
+}
+
+std::optional<Measurement<1>> gained_component(const FusionEstimate& e, int index, double value, double variance,
+                                               double least_gain) {
+  const double p = e.P(index, index);
+  if (!(variance > 0.0) || variance >= (1.0 - least_gain) * p) return std::nullopt;
+  const Equivalent q = equivalent(value - e.x(index), p, variance);
+  Measurement<1> m;
+  m.H(0, index) = 1.0;
+  m.innovation(0) = q.innovation;
+  m.R(0, 0) = q.variance;
+  return m;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,40 @@
+/// The two motion models of paper C, constant acceleration (CA) and constant turn (CT); MODEL.md, section 3.
+///
+/// Both let the speed change with the acceleration; they differ in the turn: CA drives straight on and draws a small
+/// yaw rate anew at each step, CT keeps its yaw rate and lets it wander.
+#pragma once
+
+#include "fusion/fusion_state.h"
+
+namespace roadfix {
+
+enum class MotionKind { kConstantAcceleration, kConstantTurn };
+
+struct MotionNoise {
+  double jerk = 2.0;            ///< m/s3 per sqrt(Hz): acceleration as a random walk
+  double straight_turn = 0.03;  ///< rad/s, yaw rate of a car that drives straight, each step anew
+  double turn_change = 0.14;    ///< rad/s, change of a turning car's yaw rate per step
+  double scale_walk = 2e-5;     ///< per sqrt(s), of the odometries' scales
+  double drift_walk = 2e-6;     ///< rad/s per sqrt(s), of their yaw drifts
+};
+
+/// Mean after dt; clones and parameters stay.
+fusion::Vector moved(const fusion::Vector& x, MotionKind kind, double dt);
+
+/// d moved / d x of the base states, (F.4).
+using BaseMatrix = Eigen::Matrix<double, fusion::kBase, fusion::kBase>;
+BaseMatrix moved_jacobian(const fusion::Vector& x, MotionKind kind, double dt);
+
+/// Mean and covariance after dt, (F.5).
+void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt);
+
+template <class Visitor>
+void visit(MotionNoise& c, Visitor& v) {
+  v.number("jerk_mps3_per_rthz", c.jerk, 0.0, 100.0);
+  v.number("straight_turn_radps", c.straight_turn, 1e-4, 1.0);
+  v.number("turn_change_radps", c.turn_change, 1e-4, 10.0);
+  v.number("scale_walk_per_rts", c.scale_walk, 0.0, 0.1);
+  v.number("drift_walk_radps_per_rts", c.drift_walk, 0.0, 0.1);
+}
+
+}  // namespace roadfix

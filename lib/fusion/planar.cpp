@@ -1,0 +1,85 @@
+#include "fusion/planar.h"
+
+#include <cmath>
+
+#include "geometry/euler.h"
+#include "geometry/so3.h"
+
+namespace roadfix {
+namespace {
+
+Eigen::Matrix2d rotation(double yaw) { return Eigen::Rotation2Dd(yaw).toRotationMatrix(); }
+
+}  // namespace
+
+Planar planar_pose(const Odometry& o) {
+  return {o.T_frame_vehicle.p.x(), o.T_frame_vehicle.p.y(), yaw_of(o.T_frame_vehicle.q)};
+}
+
+Eigen::Matrix3d planar_covariance(const Odometry& o) {
+  const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
+  Eigen::Matrix<double, 3, 6> J = Eigen::Matrix<double, 3, 6>::Zero();
+  J(0, 0) = J(1, 1) = 1.0;
+  J(2, 4) = std::sin(a.roll) / std::cos(a.pitch);
+  J(2, 5) = std::cos(a.roll) / std::cos(a.pitch);
+  return J * o.cov_pose * J.transpose();
+}
+
+Planar motion_between(const Planar& a, const Planar& b) {
+  const Eigen::Vector2d d = rotation(-a.z()) * (b - a).head<2>();
+  return {d.x(), d.y(), wrap_angle(b.z() - a.z())};
+}
+
+Planar after_motion(const Planar& a, const Planar& motion) {
+  const Eigen::Vector2d d = rotation(a.z()) * motion.head<2>();
+  return {a.x() + d.x(), a.y() + d.y(), wrap_angle(a.z() + motion.z())};
+}
+
+Eigen::Matrix3d motion_by_start(const Planar& a, const Planar& b) {
+  const Planar m = motion_between(a, b);
+  Eigen::Matrix3d J = -motion_by_end(a);
+  J(0, 2) = m.y();
+  J(1, 2) = -m.x();
+  return J;
+}
+
+Eigen::Matrix3d motion_by_end(const Planar& a) {
+  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+  J.topLeftCorner<2, 2>() = rotation(-a.z());
+  return J;
+}
+
+Eigen::Matrix3d after_motion_by_start(const Planar& a, const Planar& motion) {
+  const Eigen::Vector2d d = rotation(a.z()) * motion.head<2>();
+  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+  J(0, 2) = -d.y();
+  J(1, 2) = d.x();
+  return J;
+}
+
+Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, const Planar& motion,
+                                  const Eigen::Matrix3d& P_b, const Eigen::Vector3d& floor_sigma) {
+  const Eigen::Matrix3d carry = after_motion_by_start(a, motion);
+  const Eigen::Matrix3d grown = P_b - carry * P_a * carry.transpose();
+  const Eigen::Matrix3d to_start = motion_by_end(a);
+  const Eigen::Matrix3d in_start = to_start * grown * to_start.transpose();
+  // In units of the floor, so that metres and radians may share an eigenvalue problem.
+  const Eigen::Matrix3d unit = floor_sigma.asDiagonal(), inverse = floor_sigma.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * inverse * (in_start + in_start.transpose()) *
+                                                              inverse);
+  const Eigen::Vector3d kept = solver.eigenvalues().cwiseMax(1.0);
+  return unit * solver.eigenvectors() * kept.asDiagonal() * solver.eigenvectors().transpose() * unit;
+}
+
+Planar motion_by_velocity(const Odometry& a, const Odometry& b) {
+  const double dt = seconds_between(a.t_us, b.t_us);
+  const double turn = 0.5 * (a.angular_rate.z() + b.angular_rate.z()) * dt;
+  // Both velocities in a's level axes; b's axes are turned by what the rates say, not by b's corrected attitude.
+  const YawPitchRoll from = yaw_pitch_roll(a.T_frame_vehicle.q), to = yaw_pitch_roll(b.T_frame_vehicle.q);
+  const Eigen::Vector3d v_a = quaternion({0.0, from.pitch, from.roll}) * a.velocity;
+  const Eigen::Vector3d v_b = quaternion({turn, to.pitch, to.roll}) * b.velocity;
+  const Eigen::Vector3d d = 0.5 * dt * (v_a + v_b);
+  return {d.x(), d.y(), turn};
+}
+
+}  // namespace roadfix

@@ -1,0 +1,38 @@
+/// Poses seen from above: east, north, yaw, and how they move (MODEL.md, section 4).
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "samples/samples.h"
+
+namespace roadfix {
+
+/// x, y (m), yaw (rad) in some level frame.
+using Planar = Eigen::Vector3d;
+
+Planar planar_pose(const Odometry& odometry);
+/// Its covariance from the 6x6 pose covariance: yaw's error is that of the rotation about the level frame's z.
+Eigen::Matrix3d planar_covariance(const Odometry& odometry);
+
+/// Motion from a to b in a's axes: forward, left, turn.
+Planar motion_between(const Planar& a, const Planar& b);
+/// The pose reached from a by a motion in a's axes.
+Planar after_motion(const Planar& a, const Planar& motion);
+
+/// d motion_between / d a and / d b.
+Eigen::Matrix3d motion_by_start(const Planar& a, const Planar& b);
+Eigen::Matrix3d motion_by_end(const Planar& a);
+
+/// d after_motion / d a.
+Eigen::Matrix3d after_motion_by_start(const Planar& a, const Planar& motion);
+
+/// Covariance of the motion between two poses of one estimator, in the axes of a, if its errors were a sum of
+/// independent steps: what the second covariance has more than the first carried along (F.12). Directions in which it
+/// shrank, because the estimator learnt something, get the floor.
+Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, const Planar& motion,
+                                  const Eigen::Matrix3d& P_b, const Eigen::Vector3d& floor_sigma);
+
+/// Motion from a to b by the mean of the velocities: for a step in which the estimator corrected itself.
+Planar motion_by_velocity(const Odometry& a, const Odometry& b);
+
+}  // namespace roadfix

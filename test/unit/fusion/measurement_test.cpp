@@ -1,0 +1,142 @@
+#include "fusion/measurement.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+
+#include "draws.h"
+#include "geometry/euler.h"
+#include "geometry/so3.h"
+#include "support/numerical_jacobian.h"
+
+namespace roadfix {
+
+using namespace fusion;
+
+namespace {
+
+using test::Draws;
+using test::random_estimate;
+
+const ChannelSlots kVision{kVoClone, kVoScale, kVoDrift};
+
+TEST_CASE("Jacobian of the relative motion, scale and drift included") {
+  Draws draws(1);
+  for (int i = 0; i < 21; ++i) {
+    const Vector x = random_estimate(draws).x;
+    const Planar motion = draws.vector<3>(0.5);
+    for (const ChannelSlots& slots : {kVision, ChannelSlots{kInsClone, std::nullopt, std::nullopt}}) {
+      const auto h = [&](const Vector& d) {
+        return Eigen::Vector3d(
+            -relative_motion(plus(x, d), slots, motion, 0.3, Eigen::Matrix3d::Identity()).innovation);
+      };
+      const Measurement<3> m = relative_motion(x, slots, motion, 0.3, Eigen::Matrix3d::Identity());
+      CHECK((m.H - test::numerical_jacobian<3, kSize>(h, 1e-5)).cwiseAbs().maxCoeff() < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("Jacobians of planar motion") {
+  Draws draws(2);
+  for (int i = 0; i < 20; ++i) {
+    const Planar a = draws.vector<3>(1.0), b = draws.vector<3>(1.0), m = draws.vector<3>(1.0);
+    const auto by_a = [&](const Eigen::Vector3d& d) { return motion_between(a + d, b); };
+    const auto by_b = [&](const Eigen::Vector3d& d) { return motion_between(a, b + d); };
+    const auto after = [&](const Eigen::Vector3d& d) { return after_motion(a + d, m); };
+    CHECK((motion_by_start(a, b) - test::numerical_jacobian<3, 3>(by_a)).norm() < 1e-7);
+    CHECK((motion_by_end(a) - test::numerical_jacobian<3, 3>(by_b)).norm() < 1e-7);
+    CHECK((after_motion_by_start(a, m) - test::numerical_jacobian<3, 3>(after)).norm() < 1e-7);
+    CHECK((after_motion(a, motion_between(a, b)) - Planar(b.x(), b.y(), wrap_angle(b.z()))).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("a cloned pose is correlated as the pose is, and moves with it") {
+  Draws draws(3);
+  FusionEstimate e = random_estimate(draws);
+  clone_pose(e, kVoClone);
+  CHECK(e.P.block<3, 3>(kVoClone, kVoClone) == e.P.block<3, 3>(kPos, kPos));
+  CHECK(e.P.block<3, 3>(kVoClone, kPos) == e.P.block<3, 3>(kPos, kPos));
+  // Their difference is exactly known, so measuring "no motion" tells nothing of the place.
+  const FusionEstimate before = e;
+  const Measurement<3> m = relative_motion(e.x, {kVoClone, std::nullopt, std::nullopt}, Planar::Zero(), 0.1,
+                                           1e-4 * Eigen::Matrix3d::Identity());
+  (void)kalman_update<3>(e, m.H, m.innovation, m.R);
+  CHECK((e.P - before.P).norm() < 1e-9);
+}
+
+TEST_CASE("the gained measurement takes the estimate to the pose and its covariance") {
+  Draws draws(4);
+  FusionEstimate e = random_estimate(draws);
+  const Eigen::Matrix3d P = e.P.block<3, 3>(kPos, kPos);
+  const Eigen::Matrix3d better = 0.3 * P;
+  const Planar pose = e.x.segment<3>(kPos) + Planar(0.1, -0.2, 0.05);
+  const auto gain = gained_pose(e, pose, better, 0.1);
+  REQUIRE(gain);
+  (void)kalman_update<3>(e, gain->H, gain->innovation, gain->R);
+  CHECK((e.x.segment<3>(kPos) - pose).norm() < 1e-9);
+  CHECK((e.P.block<3, 3>(kPos, kPos) - better).norm() < 1e-9);
+}
+
+TEST_CASE("what is not better is not used, direction by direction") {
+  FusionEstimate e;
+  e.P.setIdentity();
+  CHECK(!gained_pose(e, {1.0, 1.0, 0.1}, Eigen::Matrix3d::Identity(), 0.1));
+  CHECK(!gained_pose(e, {1.0, 1.0, 0.1}, 4.0 * Eigen::Matrix3d::Identity(), 0.1));
+  const auto gain = gained_pose(e, {1.0, 1.0, 0.1}, Eigen::Vector3d(0.25, 4.0, 4.0).asDiagonal(), 0.1);
+  REQUIRE(gain);
+  (void)kalman_update<3>(e, gain->H, gain->innovation, gain->R);
+  CHECK(e.x(kPos) == Approx(1.0));
+  CHECK(e.P(kPos, kPos) == Approx(0.25));
+  CHECK(std::abs(e.x(kPos + 1)) < 1e-9);
+  CHECK(e.P(kPos + 1, kPos + 1) == Approx(1.0));
+}
+
+TEST_CASE("the same information twice is used once") {
+  FusionEstimate e;
+  e.P = 4.0 * Matrix::Identity();
+  const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  const auto first = gained_pose(e, {0.5, 0.0, 0.0}, R, 0.1);
+  REQUIRE(first);
+  (void)kalman_update<3>(e, first->H, first->innovation, first->R);
+  CHECK(!gained_pose(e, {0.5, 0.0, 0.0}, R, 0.1));
+}
+
+TEST_CASE("infinite variance has no effect, to the bit") {
+  Draws draws(5);
+  FusionEstimate e = random_estimate(draws);
+  const FusionEstimate before = e;
+  Measurement<3> m = absolute_pose(e.x, {5.0, 5.0, 1.0}, Eigen::Matrix3d::Identity());
+  m.R.diagonal().setConstant(std::numeric_limits<double>::infinity());
+  CHECK(kalman_update<3>(e, m.H, m.innovation, m.R).log_likelihood == 0.0);
+  CHECK(e.x == before.x);
+  CHECK(e.P == before.P);
+}
+
+TEST_CASE("growth of a covariance becomes the covariance of the motion, and learning does not make it negative") {
+  const Planar a(0.0, 0.0, 0.5), motion(2.0, 0.0, 0.1);
+  const Eigen::Matrix3d P = Eigen::Vector3d(0.04, 0.04, 1e-4).asDiagonal();
+  const Eigen::Matrix3d carry = after_motion_by_start(a, motion);
+  const Eigen::Matrix3d Q = Eigen::Vector3d(0.01, 0.02, 1e-5).asDiagonal();  // in a's axes
+  const Eigen::Matrix3d to_frame = motion_by_end(a).transpose();
+  const Eigen::Matrix3d grown = carry * P * carry.transpose() + to_frame * Q * to_frame.transpose();
+  CHECK((motion_covariance(a, P, motion, grown, {1e-3, 1e-3, 1e-4}) - Q).norm() < 1e-9);
+  const Eigen::Matrix3d learnt = motion_covariance(a, P, motion, 0.1 * P, {1e-3, 1e-3, 1e-4});
+  CHECK((learnt - Eigen::Vector3d(1e-6, 1e-6, 1e-8).asDiagonal().toDenseMatrix()).norm() < 1e-12);
+}
+
+TEST_CASE("velocities tell the motion without the jump") {
+  Odometry a, b;
+  b.t_us = 100'000;
+  a.velocity = b.velocity = Eigen::Vector3d(10.0, 0.0, 0.0);
+  a.angular_rate.z() = b.angular_rate.z() = 0.2;
+  a.T_frame_vehicle.q = quaternion({0.3, 0.0, 0.0});
+  b.T_frame_vehicle.p = Eigen::Vector3d(7.0, 7.0, 0.0);  // wherever a fix took it
+  b.T_frame_vehicle.q = quaternion({1.0, 0.0, 0.0});
+  const Planar m = motion_by_velocity(a, b);
+  CHECK(m.x() == Approx(1.0).epsilon(1e-3));
+  CHECK(m.y() == Approx(0.01).epsilon(1e-2));
+  CHECK(m.z() == Approx(0.02));
+}
+
+}  // namespace
+}  // namespace roadfix
