@@ -1,5 +1,6 @@
 """gnss_ins: the GNSS/INS EKF on the drives of ../shared/data and on simulated ones."""
 import csv
+import statistics
 
 from support import Skipped
 
@@ -9,6 +10,7 @@ NO_WHEELS = ("--without", "wheels")
 ADIS_PHASES = (0, 30, 60, 90, 120, 150)
 YAW_STARTS_S = (100, 260, 420, 580, 740, 900, 1060, 1220)
 YAW_AFTER_S = 60.0
+NEES_SEEDS = 50
 
 
 def adis(runs, *flags):
@@ -63,6 +65,15 @@ def car_1hz(runs):
     return runs.scored(CHANNEL, STAGES, "car_0708", "--gnss-every", 4)
 
 
+def nees(runs):
+    """NEES per degree of freedom of pose and velocity, mean over 50 simulated drives of two minutes."""
+    ratios = []
+    for seed in range(1, NEES_SEEDS + 1):
+        honesty = runs.simulated(CHANNEL, STAGES, "city_loop", seed, "--duration", 120)["honesty"]
+        ratios.append((6 * honesty["pose"]["nees_per_dof"] + 3 * honesty["velocity_mps"]["nees_per_dof"]) / 9)
+    return statistics.mean(ratios)
+
+
 MEASUREMENTS = {
     "adis_h_m": lambda runs: adis(runs, *NO_WHEELS)["errors"]["horizontal_m"]["rmse"],
     "adis_yaw_deg": lambda runs: adis(runs, *NO_WHEELS)["errors"]["yaw_deg"]["rmse"],
@@ -79,6 +90,7 @@ MEASUREMENTS = {
     "car_15s_m": car_window(15, 60, (0, 10, 20, 30, 40, 50)),
     "car_30s_m": car_window(30, 90, (0, 15, 30, 45, 60, 75)),
     "car_60s_m": car_window(60, 120, (0, 20, 40, 60, 80, 100)),
+    "nees": nees,
     "car_1hz_h_m": lambda runs: car_1hz(runs)["errors"]["horizontal_m"]["rmse"],
     "car_within_3sigma": lambda runs: car_1hz(runs)["honesty"]["position_m"]["within_3sigma"],
 }

@@ -72,6 +72,21 @@ class Runs:
 
         return self.once(("import", drive, flags), run)
 
+    def simulated(self, channel, stages, scenario, seed, *flags):
+        """The figures of one channel on one simulated drive."""
+
+        def run():
+            folder = self.folder(scenario, seed, *flags)
+            log, vehicle, out = folder / "drive.lcm", folder / "vehicle", folder / "out.lcm"
+            self.roadfix("simulate", scenario, "--seed", seed, *flags, "--out", log, "--vehicle", vehicle, "--overwrite")
+            self.roadfix("replay", log, "--stages", stages, "--config", vehicle, "--out", out)
+            self.roadfix("evaluate", out, "--out", folder / "report", "--channel", channel)
+            log.unlink()
+            out.unlink()
+            return json.loads((folder / "report" / "figures.json").read_text())["channels"][channel]
+
+        return self.once(("simulated", channel, stages, scenario, seed, flags), run)
+
     def folder(self, *words):
         name = "_".join(str(word).lstrip("-").replace(",", "_") for word in words) or "run"
         path = self.work / name
