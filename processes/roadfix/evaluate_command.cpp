@@ -97,10 +97,11 @@ EvaluationReport evaluate(const Options& options) {
   const PoseStream& reference = truth.poses.at("REFERENCE");
   for (const std::string& channel : chosen_channels(options, log)) {
     EstimateInput input = estimate_input(channel, std::move(log.poses.at(channel)), reference, truth, report);
-    if (channel == "POSE_FUSED") input.modes = log.modes;
+    if (channel == "POSE_FUSED") input.modes = log.fusion.modes;
     report.channels.push_back(
         evaluate_channel(report.reference, report.facts, std::move(input), evaluation_options(options)));
   }
+  report.fusion = std::move(log.fusion);
   return report;
 }
 

@@ -11,13 +11,11 @@
 #include "geodesy/enu_anchor.h"
 #include "geometry/frames.h"
 #include "roadfix/config_t.hpp"
-#include "roadfix/fusion_state_t.hpp"
 
 namespace roadfix {
 namespace {
 
 constexpr const char* kReferenceChannel = "REFERENCE";
-constexpr const char* kTurnMode = "constant_turn";
 
 Validity validity_of(int8_t value) {
   if (value == pose_t::VALIDITY_VALID) return Validity::kValid;
@@ -115,14 +113,6 @@ class StreamBuilder {
   SE3 T_first_last_;
 };
 
-std::optional<ModeSample> mode_of(const fusion_state_t& state) {
-  for (int i = 0; i < state.num_modes; ++i) {
-    const auto mode = static_cast<std::size_t>(i);
-    if (state.mode_name[mode] == kTurnMode) return ModeSample{state.utime, state.mode_probability[mode]};
-  }
-  return std::nullopt;
-}
-
 void read_facts(const config_t& config, const std::filesystem::path& path, EvaluationLog& log) {
   log.facts = parse_config<DriveFacts>(config.config_yaml, path.string() + " (CONFIG_DRIVE)");
   if (!config.calibration_yaml.empty()) {
@@ -152,7 +142,7 @@ class LogCollector {
       read_facts(decode<config_t>(event.data), path_, log_);
     } else if (channel == "FUSION_STATE") {
       if (checks_.fusion(event.data) != CheckResult::kOk) return false;
-      if (const auto mode = mode_of(decode<fusion_state_t>(event.data))) log_.modes.push_back(*mode);
+      append(decode<fusion_state_t>(event.data), log_.fusion);
     }
     return true;
   }

@@ -11,6 +11,7 @@
 
 #include "config/calibration.h"
 #include "evaluation/evaluate.h"
+#include "roadfix/evaluate/fusion_series.h"
 #include "roadfix/pose_t.hpp"
 
 namespace roadfix {
@@ -38,7 +39,7 @@ struct EvaluationLog {
   bool has_facts = false;
   Calibration calibration;
   std::map<std::string, PoseStream> poses;  ///< REFERENCE among them
-  std::vector<ModeSample> modes;
+  FusionSeries fusion;
   std::vector<std::string> notes;  ///< what a reader of the figures must know: damage, missing facts
 };
 

@@ -163,6 +163,27 @@ function drawNees() {
   timePlot(byId("nees"), { label: "NEES", height: 230, series, log: true, line: 1, high: Math.max(10, largest(values, 1) * 1.5), low: Math.min(0.1, Math.max(1e-3, quantile(values, 0.02))) });
 }
 
+const weightColors = () => Object.keys(plots.fusion.weights).map((name, i) => [name, (channels.find((c) => c.channel === name) || { color: palette[(i + 3) % palette.length] }).color]);
+
+function drawFusion() {
+  if (!plots.fusion.t.length) return;
+  const modes = [{ name: "constant turn", color: palette[3], t: plots.fusion.mode_t, y: plots.fusion.turn }];
+  timePlot(byId("modes"), { label: "Mode probability", height: 130, low: 0, high: 1.02, series: modes, line: 0.5 });
+  const series = weightColors().map(([name, color]) => ({ name, color, t: plots.fusion.t, y: plots.fusion.weights[name] }));
+  timePlot(byId("weights"), { label: "Channel weights", height: 170, low: 0, high: 1.02, series });
+}
+
+function fusionLegend() {
+  if (!plots.fusion.t.length) { byId("fusion-section").remove(); return; }
+  for (const [name, color] of weightColors()) legendEntry(byId("weights-legend"), name, color);
+}
+
+function legendEntry(legend, name, color) {
+  const entry = node("span", {}, legend);
+  node("i", { style: `background:${color}` }, entry);
+  entry.append(name);
+}
+
 function drawPresence() {
   const host = byId("presence");
   host.textContent = "";
@@ -178,11 +199,7 @@ function drawPresence() {
   timeLabels(svg, x, width, height - 6);
   const legend = byId("presence-legend");
   legend.textContent = "";
-  [["valid", 3], ["coasting", 2], ["invalid", 1], ["silent", 0]].forEach(([name, kind]) => {
-    const entry = node("span", {}, legend);
-    node("i", { style: `background:${colors[kind]}` }, entry);
-    entry.append(name);
-  });
+  [["valid", 3], ["coasting", 2], ["invalid", 1], ["silent", 0]].forEach(([name, kind]) => legendEntry(legend, name, colors[kind]));
 }
 
 const heat = (share) => `hsl(${Math.round(220 - 220 * Math.min(1, Math.max(0, share)))} 85% 50%)`;
@@ -251,7 +268,7 @@ function outageTable() {
   }
 }
 
-function draw() { drawMap(); drawHorizontal(); drawPresence(); drawAxes(); drawNees(); }
+function draw() { drawMap(); drawHorizontal(); drawPresence(); drawAxes(); drawNees(); drawFusion(); }
 
 function start() {
   const first = channels[0] ? channels[0].figures : null;
@@ -265,6 +282,7 @@ function start() {
   byId("map-mode").prepend(node("option", { value: "all", selected: "" }, null, "all paths"));
   byId("map-mode").value = "all";
   outageTable();
+  fusionLegend();
   byId("map-mode").addEventListener("change", drawMap);
   byId("axis-channel").addEventListener("change", drawAxes);
   byId("log-scale").addEventListener("change", drawHorizontal);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluation/evaluate.h"
+#include "roadfix/evaluate/fusion_series.h"
 
 namespace roadfix {
 
@@ -13,6 +14,7 @@ struct EvaluationReport {
   DriveFacts facts;
   Reference reference;
   std::vector<ChannelReport> channels;
+  FusionSeries fusion;
   std::vector<std::string> notes;
 };
 

@@ -101,6 +101,24 @@ Json channel_plots(const ChannelReport& c, const Clock& clock) {
           {"presence", spans}};
 }
 
+/// Mode probability and channel weights, thinned to what a plot can show.
+Json fusion_json(const FusionSeries& fusion, const Clock& clock) {
+  const std::size_t step = fusion.t_us.size() / kMaxSamples + 1;
+  Json t = Json::array();
+  Json mode_t = Json::array();
+  Json turn = Json::array();
+  Json weights = Json::object();
+  for (std::size_t i = 0; i < fusion.t_us.size(); i += step) {
+    t.push_back(clock(fusion.t_us[i]));
+    for (const auto& [channel, values] : fusion.weights) weights[channel].push_back(fixed(values[i], 3));
+  }
+  for (std::size_t i = 0; i < fusion.modes.size(); i += step) {
+    mode_t.push_back(clock(fusion.modes[i].t_us));
+    turn.push_back(fixed(fusion.modes[i].turn_probability, 3));
+  }
+  return {{"t", t}, {"weights", weights}, {"mode_t", mode_t}, {"turn", turn}};
+}
+
 Json plots_json(const EvaluationReport& report) {
   const Clock clock(report.facts.first_fix_us);
   const auto [begin_us, end_us] = scored_time(report.reference, report.facts);
@@ -115,6 +133,7 @@ Json plots_json(const EvaluationReport& report) {
           {"outages", outages},
           {"reference", path_json(report.reference.trajectory.poses, clock,
                                   [](const Odometry& pose) { return pose.T_frame_vehicle.p; })},
+          {"fusion", fusion_json(report.fusion, clock)},
           {"channels", channels}};
 }
 

@@ -27,7 +27,7 @@ void keep(double, pose_t&) {}
 
 EvaluationReport evaluate_all(const std::filesystem::path& path) {
   EvaluationLog log = read_evaluation_log(path, {});
-  EvaluationReport report{log.facts, reference_of(log, path), {}, log.notes};
+  EvaluationReport report{log.facts, reference_of(log, path), {}, log.fusion, log.notes};
   for (auto& [channel, stream] : log.poses) {
     if (channel == "REFERENCE") continue;
     EstimateInput input;
@@ -140,6 +140,39 @@ TEST_CASE("a repeated stretch, a change of frame and bytes that are no message a
   CHECK(stream.reasons.size() == stream.trajectory.poses.size());
   REQUIRE(log.notes.size() == 1);
   CHECK(log.notes[0].find("1 messages") != std::string::npos);
+}
+
+TEST_CASE("modes and weights come from the fusion's state by name") {
+  const Folder folder("fusion");
+  fusion_state_t state{};
+  state.num_modes = 2;
+  state.mode_name = {"constant_acceleration", "constant_turn"};
+  state.mode_probability = {0.25, 0.75};
+  state.mode_log_likelihood = {0.0, 0.0};
+  const auto set_channels = [&](const std::vector<std::string>& names, const std::vector<double>& weights) {
+    state.num_channels = static_cast<int>(names.size());
+    state.channel_name = names;
+    state.channel_weight = weights;
+    state.channel_status.assign(names.size(), 0);
+    for (auto* values : {&state.channel_alpha, &state.channel_nis, &state.channel_gate, &state.channel_age_s}) {
+      values->assign(names.size(), 0.0);
+    }
+  };
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    set_channels({"POSE_INS"}, {1.0});
+    writer.write("FUSION_STATE", 1, encode(state));
+    set_channels({"POSE_INS", "POSE_VO"}, {0.4, 0.6});
+    state.utime = 5;
+    writer.write("FUSION_STATE", 5, encode(state));
+    writer.commit();
+  }
+  const FusionSeries fusion = read_evaluation_log(folder.file("out.lcm"), {}).fusion;
+  REQUIRE(fusion.modes.size() == 2);
+  CHECK(fusion.modes[1].turn_probability == 0.75);
+  CHECK(fusion.modes[1].t_us == 5);
+  CHECK(fusion.weights.at("POSE_VO") == std::vector<double>{0.0, 0.6});
+  CHECK(fusion.weights.at("POSE_INS") == std::vector<double>{1.0, 0.4});
 }
 
 TEST_CASE("a log without a reference is an error that names the file") {
