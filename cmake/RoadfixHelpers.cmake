@@ -61,7 +61,7 @@ function(roadfix_process NAME)
   target_link_libraries(roadfix_process_${NAME} PUBLIC ${ARG_DEPS} roadfix_eigen PRIVATE roadfix_options ${ARG_SYSTEM_DEPS})
   target_precompile_headers(roadfix_process_${NAME} REUSE_FROM roadfix_pch)
   add_executable(${NAME} main.cpp)
-  target_link_libraries(${NAME} PRIVATE roadfix_process_${NAME} roadfix_options)
+  target_link_libraries(${NAME} PRIVATE roadfix_process_${NAME} roadfix_build_id roadfix_options)
   add_dependencies(roadfix_programs ${NAME})
 endfunction()
 

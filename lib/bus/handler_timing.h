@@ -21,6 +21,10 @@ class HandlerTiming {
   };
   [[nodiscard]] std::vector<Row> rows() const;
 
+  /// Of one handler since the last call, in microseconds; 0 where it was not called.
+  [[nodiscard]] double take_p99_us(std::size_t handler);
+  [[nodiscard]] std::size_t handlers() const { return names_.size(); }
+
   /// Times from construction to destruction; does nothing without a table.
   class Scope {
    public:

@@ -95,6 +95,8 @@ class Stage {
 
   /// YAML, defaults included.
   [[nodiscard]] virtual std::string effective_config() const = 0;
+  /// YAML of the calibration it was made with; empty where it takes none.
+  [[nodiscard]] virtual std::string effective_calibration() const { return {}; }
 };
 
 }  // namespace roadfix

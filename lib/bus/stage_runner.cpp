@@ -19,18 +19,13 @@ std::vector<std::string> handler_names(const StageSpec& spec) {
 
 }  // namespace
 
-std::string stage_channel(const std::string& prefix, const std::string& stage_name) {
-  std::string channel = prefix;
-  for (const char c : stage_name) channel += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  return channel;
-}
-
 StageRunner::StageRunner(std::unique_ptr<Stage> stage, MessageSink& sink)
     : stage_(std::move(stage)),
       sink_(sink),
       stream_(stage_->spec().inputs, stage_->spec().clocks),
       next_seq_(stage_->spec().outputs.size()),
-      ledger_channel_(stage_channel("LEDGER_", stage_->spec().name)) {
+      ledger_channel_(stage_channel("LEDGER_", stage_->spec().name)),
+      state_channel_(stage_channel("STATE_", stage_->spec().name)) {
   for (const InputSpec& input : spec().inputs) checks_.push_back(Schema::built_in().check_of(input.type));
   for (const OutputSpec& output : spec().outputs) static_cast<void>(Schema::built_in().type(output.type));
   for (const ClockSpec& clock : spec().clocks) {
@@ -78,8 +73,11 @@ void StageRunner::tick(const Message& sample) {
   now_utime_ = sample.utime;
   provenance_current_ = false;
   publish_ledger();
-  const HandlerTiming::Scope scope(timing_.get(), handlers + 1);
-  stage_->publish(now_utime_, *this);
+  {
+    const HandlerTiming::Scope scope(timing_.get(), handlers + 1);
+    stage_->publish(now_utime_, *this);
+  }
+  publish_state();
 }
 
 Header StageRunner::stamp(int output) {
@@ -111,30 +109,6 @@ void StageRunner::send(int output, const char* type, std::span<const uint8_t> by
   const OutputSpec& declared = spec().outputs.at(static_cast<std::size_t>(output));
   if (declared.type != type) throw std::logic_error(spec().name + ": " + declared.channel + " is no " + type);
   sink_.put(declared.channel, *read_header(bytes), bytes);
-}
-
-/// Before the outputs that the new entries affect.
-void StageRunner::publish_ledger() {
-  if (stream_.ledger().total() == ledger_published_) return;
-  ledger_published_ = stream_.ledger().total();
-  ledger_t ledger{};
-  ledger.utime = now_utime_;
-  ledger.run = *stream_.run();
-  ledger.seq = next_ledger_seq_++;
-  ledger.num_entries_total = ledger_published_;
-  for (const LedgerEntry& from : stream_.ledger().recent()) {
-    ledger_entry_t& to = ledger.entries.emplace_back();
-    to.entry = from.entry;
-    to.at_clock_utime = from.at_clock_utime;
-    to.kind = static_cast<int8_t>(from.kind);
-    to.channel = spec().inputs[static_cast<std::size_t>(from.input)].channel;
-    to.input_run = from.run;
-    to.first_seq = from.first_seq;
-    to.last_seq = from.last_seq;
-    to.input_utime = from.utime;
-  }
-  ledger.num_entries = static_cast<int32_t>(ledger.entries.size());
-  sink_.put(ledger_channel_, {ledger.utime, ledger.run, ledger.seq}, encode(ledger));
 }
 
 }  // namespace roadfix

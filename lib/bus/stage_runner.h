@@ -3,7 +3,9 @@
 
 #include <array>
 #include <memory>
+#include <roadfix/config_t.hpp>
 #include <roadfix/ledger_t.hpp>
+#include <roadfix/state_t.hpp>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,19 @@ class StageRunner : private Outputs {
   [[nodiscard]] const StageSpec& spec() const { return stage_->spec(); }
   [[nodiscard]] const Stage& stage() const { return *stage_; }
   [[nodiscard]] const InputStream& stream() const { return stream_; }
+  /// Follows a recorded ledger instead of deciding by arrival. `precedent` must outlive the runner.
+  void follow(const Precedent* precedent) { stream_.follow(precedent); }
+
+  /// Goes on from a snapshot: the inputs behind its horizon must come again. Before the first offer(). Throws
+  /// std::runtime_error where the state is of another stage or layout, or damaged.
+  void resume(const state_t& state);
+
+  /// What this stage runs with; utime, run and seq are the caller's.
+  [[nodiscard]] config_t config_message() const;
+
+  /// p99 of apply() per input since the last call; needs measure_time().
+  [[nodiscard]] std::vector<double> take_apply_p99_s();
+
   /// Off until this is called.
   HandlerTiming& measure_time();
   [[nodiscard]] const HandlerTiming* timing() const { return timing_.get(); }
@@ -43,6 +58,7 @@ class StageRunner : private Outputs {
 
   void tick(const Message& sample);
   void publish_ledger();
+  void publish_state();
 
   std::unique_ptr<Stage> stage_;
   MessageSink& sink_;
@@ -52,12 +68,19 @@ class StageRunner : private Outputs {
   std::string ledger_channel_;
   int64_t next_ledger_seq_ = 0;
   int64_t ledger_published_ = 0;
+  std::string state_channel_;
+  int64_t next_state_seq_ = 0;
+  std::optional<int64_t> state_slot_;
   int64_t now_utime_ = 0;
   provenance_t provenance_;
   bool provenance_current_ = false;
   Digest digest_;
   std::unique_ptr<HandlerTiming> timing_;
 };
+
+/// Data time between two snapshots. Together with the largest lateness and the feedback's delay it stays below the 10 s
+/// that a loss by the logger may cost.
+constexpr int64_t kSnapshot_us = 9'000'000;
 
 /// "LEDGER_" + GNSS_INS_EKF: the channels that every stage has beside its outputs.
 std::string stage_channel(const std::string& prefix, const std::string& stage_name);

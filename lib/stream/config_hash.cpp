@@ -1,4 +1,4 @@
-#include "config/config_hash.h"
+#include "stream/config_hash.h"
 
 #include <span>
 

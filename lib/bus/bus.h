@@ -1,0 +1,62 @@
+/// How processes talk. One interface, several ways: the network (LCM over UDP), memory (tests), a log (a recorded drive
+/// in the order of its arrival). A handler cannot tell which.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace roadfix {
+
+/// A bus that cannot be opened or used; the text says what to do.
+struct BusError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+struct BusMessage {
+  std::string_view channel;
+  std::span<const uint8_t> bytes;  ///< as they came: unchecked; valid during the call
+  int64_t received_us = 0;         ///< wall clock; of a log: the event's stamp
+};
+
+/// What waits between the bus and its handler. Nothing is dropped without being counted.
+struct QueuePolicy {
+  std::size_t max_bytes = std::size_t{64} << 20;  ///< of one subscription; what does not fit is dropped
+};
+
+struct QueueStatus {
+  int64_t received = 0;
+  int64_t dropped = 0;  ///< did not fit into the queue
+  int32_t depth = 0;
+  int64_t oldest_us = 0;  ///< receive time of the oldest that waits; 0 when none does
+};
+
+class Bus {
+ public:
+  using Handler = std::function<void(const BusMessage&)>;
+  virtual ~Bus() = default;
+
+  /// `channels`: a regular expression over the whole name, as LCM takes it.
+  virtual void subscribe(const std::string& channels, Handler handler, const QueuePolicy& policy = {}) = 0;
+
+  /// Throws BusError where the message cannot be sent.
+  virtual void publish(const std::string& channel, std::span<const uint8_t> bytes) = 0;
+
+  /// Waits up to `patience` for a message, then hands out all that are there, in the order of their arrival.
+  /// False when no message will ever come again. What a handler throws comes through.
+  virtual bool handle(std::chrono::milliseconds patience) = 0;
+
+  /// Per subscription, in the order of subscribe().
+  [[nodiscard]] virtual std::vector<QueueStatus> queues() const { return {}; }
+
+  /// Datagrams that the kernel dropped at our socket since it was opened.
+  [[nodiscard]] virtual int64_t kernel_drops() const { return 0; }
+};
+
+}  // namespace roadfix

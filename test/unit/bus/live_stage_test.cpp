@@ -1,0 +1,113 @@
+#include "bus/live_stage.h"
+
+#include <catch2/catch.hpp>
+
+#include "bus/log_bus.h"
+#include "bus/memory_bus.h"
+#include "support/chain_stage.h"
+#include "support/small_drive.h"
+#include "support/temporary_folder.h"
+
+using namespace roadfix;
+using namespace roadfix::test;
+
+namespace {
+
+/// Everything published on a bus, per channel.
+struct Ear {
+  std::map<std::string, std::vector<std::vector<uint8_t>>> heard;
+  explicit Ear(Bus& bus) {
+    bus.subscribe(".*", [this](const BusMessage& m) {
+      heard[std::string(m.channel)].emplace_back(m.bytes.begin(), m.bytes.end());
+    });
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a stage on a bus publishes outputs, ledger, heartbeat and configuration") {
+  MemoryBus bus;
+  Ear ear(bus);
+  LiveStage live(std::make_unique<ChainStage>(filter_spec()), bus);
+  live.step(std::chrono::milliseconds(0));
+  const heartbeat_t starting = decode<heartbeat_t>(ear.heard["HEARTBEAT_FILTER"].at(0));
+  REQUIRE(starting.state == heartbeat_t::STATE_STARTING);
+  const config_t config = decode<config_t>(ear.heard["CONFIG_FILTER"].at(0));
+  REQUIRE(config.config_yaml == "factor: 0.99\n");
+  REQUIRE(config.build_id == "test");
+  REQUIRE_FALSE(config.library_versions.empty());
+  REQUIRE_FALSE(config.cpu_features.empty());
+
+  for (const DriveMessage& message : small_drive(3.0)) {
+    if (message.channel == "GNSS" && message.header.seq == 5) continue;
+    bus.publish(message.channel, message.bytes);
+  }
+  std::vector<uint8_t> broken(40, 7);
+  bus.publish("WHEELS", broken);
+  live.step(std::chrono::milliseconds(0));
+  live.stop();
+  bus.handle(std::chrono::milliseconds(0));
+  REQUIRE(ear.heard["POSE_INS"].size() == 300);
+  const heartbeat_t last = decode<heartbeat_t>(ear.heard["HEARTBEAT_FILTER"].back());
+  REQUIRE(last.state == heartbeat_t::STATE_STOPPING);
+  REQUIRE(last.num_inputs == 3);
+  REQUIRE(last.input_channel == std::vector<std::string>{"IMU", "GNSS", "WHEELS"});
+  REQUIRE(last.input_received[0] == 300);
+  REQUIRE(last.input_lost[1] == 1);
+  REQUIRE(last.input_undecodable[2] == 1);
+  REQUIRE(last.rss_bytes > 1'000'000);
+  const ledger_t ledger = decode<ledger_t>(ear.heard["LEDGER_FILTER"].back());
+  const auto lost = std::find_if(ledger.entries.begin(), ledger.entries.end(),
+                                 [](const ledger_entry_t& e) { return e.kind == ledger_entry_t::KIND_LOST; });
+  REQUIRE(lost != ledger.entries.end());
+  REQUIRE(lost->channel == "GNSS");
+  REQUIRE((lost->first_seq == 5 && lost->last_seq == 5));
+  const pose_t pose = decode<pose_t>(ear.heard["POSE_INS"].back());
+  REQUIRE(pose.provenance.ledger_entries == ledger.num_entries_total);
+  REQUIRE(pose.run == kDriveStart_us);
+  REQUIRE(pose.provenance.last_seq == std::vector<int64_t>{274, 10, 137});
+  REQUIRE(pose.provenance.num_applied == std::vector<int64_t>{275, 10, 138});
+}
+
+TEST_CASE("two publishers on a channel are said") {
+  MemoryBus bus;
+  Ear ear(bus);
+  LiveStage live(std::make_unique<ChainStage>(filter_spec()), bus);
+  for (const DriveMessage& message : small_drive(2.0)) {
+    bus.publish(message.channel, message.bytes);
+    if (message.channel != "WHEELS") continue;
+    wheels_t other = decode<wheels_t>(message.bytes);
+    other.run += 1000;
+    bus.publish("WHEELS", encode(other));
+  }
+  live.step(std::chrono::milliseconds(0));
+  live.stop();
+  bus.handle(std::chrono::milliseconds(0));
+  const heartbeat_t last = decode<heartbeat_t>(ear.heard["HEARTBEAT_FILTER"].back());
+  REQUIRE_THAT(last.state_reason, Catch::Contains("WHEELS: two publishers"));
+}
+
+TEST_CASE("a recorded log is a bus: its order of arrival gives the same outputs live, twice") {
+  TemporaryFolder folder;
+  write_drive(folder / "in.lcm", small_drive(5.0));
+  std::string bytes[2];
+  for (std::string& result : bytes) {
+    LogBus bus(folder / "in.lcm");
+    struct Catcher : MessageSink {
+      std::string all;
+      void put(const std::string& channel, const Header&, std::span<const uint8_t> b) override {
+        if (channel == "POSE_INS") all.append(b.begin(), b.end());
+      }
+    } catcher;
+    StageRunner runner(std::make_unique<ChainStage>(filter_spec()), catcher);
+    for (int i = 0; i < 3; ++i) {
+      bus.subscribe(runner.spec().inputs[static_cast<std::size_t>(i)].channel,
+                    [&runner, i](const BusMessage& m) { runner.offer(i, m.bytes); });
+    }
+    while (bus.handle(std::chrono::milliseconds(0))) {
+    }
+    result = catcher.all;
+  }
+  REQUIRE(bytes[0].size() > 10'000);
+  REQUIRE(bytes[0] == bytes[1]);
+}
