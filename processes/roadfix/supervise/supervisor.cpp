@@ -37,6 +37,7 @@ std::string how_it_ended(int status) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   execvp(arguments[0], arguments.data());
