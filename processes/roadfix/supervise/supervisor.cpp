@@ -73,7 +73,7 @@ Supervisor::Supervisor(const RunConfig& config, const std::filesystem::path& veh
 Supervisor::~Supervisor() {
   for (Child& child : children_)
     if (child.pid > 0) {
-      kill(child.pid, SIGKILL);
+      kill(-child.pid, SIGKILL);
       waitpid(child.pid, nullptr, 0);
     }
 }
@@ -87,12 +87,14 @@ void Supervisor::start(Child& child) {
     child.due = child.started + seconds(config_.backoff_max);
     return;
   }
+  setpgid(pid, pid);  // here too: the group must exist before anyone signals it
   child.pid = pid;
   say_(fmt::format("{} started, process {}", child.name, pid));
 }
 
 void Supervisor::died(Child& child, int status) {
   const auto now = Clock::now();
+  kill(-child.pid, SIGKILL);  // what it started itself and left behind
   child.pid = 0;
   child.deaths_in_a_row = now - child.started > seconds(config_.healthy_after) ? 1 : child.deaths_in_a_row + 1;
   double wait = config_.backoff_first;
@@ -126,10 +128,11 @@ void Supervisor::stop() {
     while (waitpid(child->pid, &status, WNOHANG) == 0) {
       if (sent < 3 && Clock::now() - begin >= sent * seconds(config_.stop_patience)) {
         if (sent > 0) say_(fmt::format("{} does not stop: {}", child->name, strsignal(signals[sent])));
-        kill(child->pid, signals[sent++]);
+        kill(-child->pid, signals[sent++]);
       }
       std::this_thread::sleep_for(kPoll);
     }
+    kill(-child->pid, SIGKILL);  // what it started itself and left behind
     child->pid = 0;
     say_(fmt::format("{} {}", child->name, how_it_ended(status)));
   }

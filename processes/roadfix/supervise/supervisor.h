@@ -1,7 +1,8 @@
 /// Starts the processes of a vehicle, restarts what dies with back-off, and stops them in the reverse order of their
 /// start.
 ///
-/// One supervisor a program: it reaps the children of this process. Not thread safe.
+/// Each process gets a group of its own, which is signalled whole. One supervisor a program: it reaps the children of
+/// this process. Not thread safe.
 #pragma once
 
 #include <sys/types.h>
