@@ -9,6 +9,7 @@
 #include "roadfix/commands.h"
 #include "roadfix/import/drive_log.h"
 #include "roadfix/import/source.h"
+#include "roadfix/vehicle_defaults.h"
 
 namespace roadfix {
 namespace {
@@ -54,6 +55,7 @@ void run(Options& options) {
   const std::string name = drive.description.name;
   if (!options.vehicle.empty()) {
     write_vehicle(drive.description.calibration, name, options.vehicle, options.overwrite);
+    for (const std::string& remark : write_process_defaults(options.vehicle)) std::cout << remark << "\n";
   }
   const bool shows = options.progress || isatty(STDERR_FILENO) == 1;
   const DriveLogSummary summary =
@@ -99,7 +101,8 @@ void add_import_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("import", "Make a drive log and a vehicle configuration from a recording");
   command->add_option("source", options->source, "a folder, or a file of poses")->required();
   command->add_option("--out", options->out, "the log to write")->required();
-  command->add_option("--vehicle", options->vehicle, "folder for calibration.yaml");
+  command->add_option("--vehicle", options->vehicle,
+                      "folder for calibration.yaml and one file of defaults per process");
   command->add_option("--format", options->read.format, "folder, kitti, euroc or poses (default: what it looks like)")
       ->check(CLI::IsMember(source_formats()));
   command->add_option("--without", options->changes.without, "sensors to leave out, with commas between")

@@ -132,6 +132,19 @@ class LogPlan {
   std::vector<Entry> entries_;
 };
 
+/// A picture as a message; ConfigError where its size is not the calibration's.
+image_t picture(const FrameFile& frame, const std::optional<CameraCalibration>& camera) {
+  image_t message = to_message(frame);
+  const int width = camera ? camera->width_px.value_or(message.width_px) : message.width_px;
+  const int height = camera ? camera->height_px.value_or(message.height_px) : message.height_px;
+  if (width != message.width_px || height != message.height_px) {
+    throw ConfigError(
+        frame.path.string(), 0,
+        fmt::format("is {} x {}, the calibration says {} x {}", message.width_px, message.height_px, width, height));
+  }
+  return message;
+}
+
 /// What was done to the source, as comments for a person who reads the log.
 std::string story(const Drive& drive, const ImportChanges& changes, const ChangedGnss& changed) {
   const auto comment = [](const std::string& label, const std::string& text) {
@@ -184,14 +197,15 @@ DriveLogSummary write_drive_log(Drive drive, const ImportChanges& changes, const
   config.calibration_yaml = calibration_text(drive.description.calibration);
   config.config_hash = config_hash(config.config_yaml, config.calibration_yaml);
 
+  const SensorsCalibration& sensors = drive.description.calibration.sensors;
   const std::vector<config_t> configs = {config};
   const auto as_it_is = [](const auto& message) { return message; };
   const auto convert = [](const auto& sample) { return to_message(sample); };
   const auto as_camera = [](const LocalPose& pose) { return to_message(pose, ReferenceOf::kCamera, 0.0); };
   LogPlan plan;  // the order of these lines is that of messages with the same utime
   plan.add("CONFIG_DRIVE", configs, as_it_is);
-  plan.add("CAMERA_LEFT", drive.frames_left, convert);
-  plan.add("CAMERA_RIGHT", drive.frames_right, convert);
+  plan.add("CAMERA_LEFT", drive.frames_left, [&](const FrameFile& f) { return picture(f, sensors.camera_left); });
+  plan.add("CAMERA_RIGHT", drive.frames_right, [&](const FrameFile& f) { return picture(f, sensors.camera_right); });
   plan.add("GNSS", changed.fixes, convert);
   plan.add("IMU", drive.imu, convert);
   plan.add("MAG", drive.mag, convert);

@@ -1,0 +1,70 @@
+// The command itself: exit codes and words that a user meets.
+#include <catch2/catch.hpp>
+#include <cstdlib>
+
+#include <sys/wait.h>
+
+#include "small_drive.h"
+
+namespace roadfix {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int code = 0;
+  std::string text;
+};
+
+/// Runs `roadfix import` inside the folder.
+Outcome import(const fs::path& folder, const std::string& arguments) {
+  const fs::path output = folder / "printed.txt";
+  const std::string command =
+      "cd '" + folder.string() + "' && '" ROADFIX_PROGRAM "' import " + arguments + " >'" + output.string() + "' 2>&1";
+  const int status = std::system(command.c_str());
+  return {WEXITSTATUS(status), test::read_file(output)};
+}
+
+TEST_CASE("import writes a log and a vehicle and says what went in") {
+  const test::TemporaryFolder folder;
+  fs::create_directories(folder / "drive");
+  test::write_small_drive(folder / "drive");
+  const Outcome outcome = import(folder.path(), "drive --out a.lcm --vehicle configs/small");
+  INFO(outcome.text);
+  CHECK(outcome.code == 0);
+  CHECK_THAT(outcome.text, Catch::Contains("drive: format folder"));
+  CHECK_THAT(outcome.text, Catch::Contains("IMU                 60"));
+  CHECK(fs::exists(folder / "configs/small/calibration.yaml"));
+  CHECK(fs::exists(folder / "configs/small/gnss_ins_ekf.yaml"));
+  CHECK(import(folder.path(), "drive --out b.lcm --vehicle configs/small --format folder").code == 0);
+  CHECK(test::read_file(folder / "a.lcm") == test::read_file(folder / "b.lcm"));
+}
+
+TEST_CASE("a user's mistake ends with exit code 2 and a line that names it") {
+  const test::TemporaryFolder folder;
+  fs::create_directories(folder / "drive");
+  test::write_small_drive(folder / "drive");
+  const std::vector<std::pair<std::string, std::string>> mistakes = {
+      {"nowhere --out a.lcm", "roadfix: nowhere: no such file or folder"},
+      {"drive", "--out is required"},
+      {"drive --out a.lcm --format rosbag", "--format"},
+      {"drive --out a.lcm --without radar", "--without"},
+      {"drive --out a.lcm --cut-gnss 1", "--cut-gnss requires --every"},
+      {"drive --out a.lcm --cut-gnss 5 --every 1", "roadfix: --every must not be shorter than --cut-gnss"},
+      {"drive --out a.lcm --gnss-bias-after-outage 15", "--gnss-bias-after-outage requires --cut-gnss"},
+      {"drive --out a.lcm --gnss-every 0", "--gnss-every"},
+      {"drive --out a.lcm --gnss-every 2 --without gnss", "roadfix: there are no fixes to cut, thin out or move"},
+      {"drive --out no/such/folder/a.lcm", "no/such/folder/a.lcm"},
+      {"drive --out a.lcm --start-after 1e9", "roadfix: nothing is left of the drive"},
+  };
+  for (const auto& [arguments, words] : mistakes) {
+    const Outcome outcome = import(folder.path(), arguments);
+    INFO(arguments << ": " << outcome.text);
+    CHECK(outcome.code == 2);
+    CHECK_THAT(outcome.text, Catch::Contains(words));
+    CHECK_FALSE(fs::exists(folder / "a.lcm"));
+  }
+}
+
+}  // namespace
+}  // namespace roadfix
