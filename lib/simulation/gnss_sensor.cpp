@@ -136,12 +136,22 @@ GnssFix measure(const SimulatedDrive& drive, double t_s, const GnssError& error,
   return fix;
 }
 
+/// Heading of the vehicle's x axis, clockwise from true north at the antenna, as two antennas on it measure it.
+GnssHeading measure_heading(const SimulatedDrive& drive, double t_s, double error, double claim) {
+  const AntennaState antenna = antenna_at(drive, t_s);
+  const Eigen::Vector3d forward = drive.motion->at(t_s).T_enu_vehicle.q * Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d here = antenna.R_anchor_here.transpose() * forward;
+  const double heading = std::atan2(here.x(), here.y()) + error;
+  return {heading < 0.0 ? heading + 2.0 * kPi : heading, claim * drive.config.gnss.sigma_heading_rad};
+}
+
 }  // namespace
 
 void simulate_gnss(SimulatedDrive& drive) {
   const GnssConfig& c = drive.config.gnss;
   RandomStream position_noise = stream_of(drive, NoiseStream::kGnssPosition);
   RandomStream velocity_noise = stream_of(drive, NoiseStream::kGnssVelocity);
+  RandomStream heading_noise = stream_of(drive, NoiseStream::kGnssHeading);
   GaussMarkov3 multipath(1.0, c.multipath_correlation_s, stream_of(drive, NoiseStream::kGnssMultipath));
   drive.errors.gnss_lever_arm =
       c.lever_arm_m + c.lever_arm_std_m * stream_of(drive, NoiseStream::kGnssLeverArm).normal3();
@@ -158,6 +168,10 @@ void simulate_gnss(SimulatedDrive& drive) {
     error.velocity = d.noise_factor * c.sigma_velocity_mps * velocity_noise.normal3() + d.added.velocity;
     multipath.advance(1.0 / c.rate_hz);
     drive.gnss.push_back(measure(drive, t_s, error, d));
+    if (c.sigma_heading_rad > 0.0) {
+      error.heading = d.noise_factor * c.sigma_heading_rad * heading_noise.normal();
+      drive.gnss.back().heading = measure_heading(drive, t_s, error.heading, c.claimed_sigma_factor * d.claim);
+    }
     drive.gnss.back().t_us = drive.config.start_utime + t_us;
     drive.errors.gnss.push_back(error);
   }

@@ -71,6 +71,7 @@ struct GnssConfig {
   double multipath_sigma_m = 0.0;  ///< correlated error, Gauss-Markov, each axis (up: twice)
   double multipath_correlation_s = 30.0;
   double sigma_velocity_mps = 0.03;                ///< white, each axis; zero: the receiver gives no velocity
+  double sigma_heading_rad = 0.0;                  ///< white, of a dual-antenna heading; zero: one antenna
   double claimed_sigma_factor = 1.0;               ///< of the claimed sigma, over the true one
   Eigen::Vector3d lever_arm_m = {-0.3, 0.0, 1.4};  ///< antenna in the vehicle, as the calibration says
   double lever_arm_std_m = 0.0;                    ///< true lever arm about it, each axis
@@ -187,6 +188,7 @@ void visit(GnssConfig& c, Visitor& v) {
   v.number("multipath_sigma_m", c.multipath_sigma_m, 0.0, 1000.0);
   v.number("multipath_correlation_s", c.multipath_correlation_s, 0.1, 1e5);
   v.number("sigma_velocity_mps", c.sigma_velocity_mps, 0.0, 100.0);
+  v.number("sigma_heading_rad", c.sigma_heading_rad, 0.0, 1.0);
   v.number("claimed_sigma_factor", c.claimed_sigma_factor, 1e-3, 1e3);
   v.vector("lever_arm_m", c.lever_arm_m, -20.0, 20.0);
   v.number("lever_arm_std_m", c.lever_arm_std_m, 0.0, 5.0);

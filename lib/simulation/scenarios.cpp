@@ -99,6 +99,8 @@ const std::vector<Scenario>& scenarios() {
       {"corridor", "indoors at walking pace, without GNSS",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kCorridor;
+         c.motion.acceleration_mps2 = c.motion.braking_mps2 = 0.6;
+         c.motion.lateral_mps2 = 0.8;
          c.motion.hill_factor = 0.0;
          c.gnss.rate_hz = 0.0;
          c.duration_s = 150.0;

@@ -30,6 +30,7 @@ enum class NoiseStream : std::uint64_t {
   kSoftIron = 19,
   kLink = 20,
   kFault = 21,
+  kGnssHeading = 22,
 };
 
 /// `instance` tells sources of one kind apart, below 2^56.

@@ -32,6 +32,7 @@ struct ImuBias {
 struct GnssError {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< m, faults included; the effect of latency is not in it
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s
+  double heading = 0.0;                                ///< rad
 };
 
 /// How the sample with the same index came about and reached the log.

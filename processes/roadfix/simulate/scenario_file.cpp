@@ -13,11 +13,6 @@ struct ScenarioFile {
   ScenarioConfig config = scenario("city_loop");
 };
 
-bool is_scenario(const std::string& name) {
-  const std::vector<std::string> names = scenario_names();
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 template <class Visitor>
 void visit(ScenarioFile& f, Visitor& v) {
   const std::string before = f.base;
@@ -28,6 +23,11 @@ void visit(ScenarioFile& f, Visitor& v) {
 }
 
 }  // namespace
+
+bool is_scenario(const std::string& name) {
+  const std::vector<std::string> names = scenario_names();
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
 
 ScenarioConfig load_scenario(const std::string& name_or_file) {
   const bool is_file = std::filesystem::path(name_or_file).has_extension() || std::filesystem::exists(name_or_file);

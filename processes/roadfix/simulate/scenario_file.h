@@ -12,6 +12,8 @@ namespace roadfix {
 /// The name of a scenario, or a YAML file; ConfigError or std::invalid_argument where it is neither.
 ScenarioConfig load_scenario(const std::string& name_or_file);
 
+bool is_scenario(const std::string& name);
+
 /// All values, as a file that load_scenario() takes.
 std::string scenario_text(const ScenarioConfig& config);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <roadfix/config_t.hpp>
+#include <sstream>
 
 #include "bus/log_writer.h"
 #include "bus/message.h"
@@ -14,6 +15,7 @@
 #include "geometry/frames.h"
 #include "roadfix/import/drive_messages.h"
 #include "roadfix/simulate/scenario_file.h"
+#include "simulation/scenarios.h"
 
 namespace roadfix {
 namespace {
@@ -81,17 +83,24 @@ pose_t reference_message(const SimulatedDrive& drive, const Odometry& truth) {
   return pose;
 }
 
+/// Where the drive comes from, as comments. A scenario as it stands is named, not spelled out: its log stays the same
+/// when a later version gives scenarios another key.
+std::string story(const SimulatedDrive& drive) {
+  const std::string text = scenario_text(drive.config);
+  if (is_scenario(drive.config.name) && text == scenario_text(scenario(drive.config.name))) {
+    return fmt::format("# Simulated: {}, seed {}.\n", drive.config.name, drive.seed);
+  }
+  std::string comment = fmt::format("# Simulated with seed {} from this scenario:\n", drive.seed);
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) comment += "# " + line + "\n";
+  return comment;
+}
+
 config_t config_message(const SimulatedDrive& drive) {
   config_t config{};
   config.utime = drive.config.start_utime;
   config.process = "drive";
-  config.config_yaml = fmt::format("# Simulated with seed {} from this scenario:\n", drive.seed);
-  const std::string scenario = scenario_text(drive.config);
-  for (std::size_t begin = 0; begin < scenario.size();) {
-    const std::size_t end = scenario.find('\n', begin);
-    config.config_yaml += "# " + scenario.substr(begin, end - begin) + "\n";
-    begin = end == std::string::npos ? scenario.size() : end + 1;
-  }
+  config.config_yaml = story(drive);
   config.config_yaml += config_text(facts_of(drive));
   config.calibration_yaml = calibration_text(calibration_of(drive.config));
   config.config_hash = config_hash(config.config_yaml, config.calibration_yaml);

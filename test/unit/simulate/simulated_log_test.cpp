@@ -125,6 +125,19 @@ TEST_CASE("CONFIG_DRIVE carries facts, calibration and the scenario with its see
   CHECK(calibration.sensors.imu->gyro_noise == drive.config.imu.gyro_noise_radps_per_rthz);
 }
 
+TEST_CASE("a scenario as it stands is named, another one spelled out so that it can be made again") {
+  const test::TemporaryFolder folder;
+  ScenarioConfig config = scenario("corridor");
+  config.duration_s = 20.0;
+  write_simulated_log(simulate(config, 9), folder / "changed.lcm");
+  const std::string changed = messages<config_t>(folder / "changed.lcm", "CONFIG_DRIVE").at(0).config_yaml;
+  CHECK_THAT(changed, Catch::Matchers::Contains("duration_s: 20") && Catch::Matchers::Contains("seed 9"));
+  write_simulated_log(simulate(scenario("demo"), 1), folder / "named.lcm");
+  const std::string named = messages<config_t>(folder / "named.lcm", "CONFIG_DRIVE").at(0).config_yaml;
+  CHECK_THAT(named, Catch::Matchers::StartsWith("# Simulated: demo, seed 1.\n"));
+  CHECK_THAT(named, !Catch::Matchers::Contains("gyro_noise"));
+}
+
 TEST_CASE("logs/demo.lcm and configs/demo are what their command makes") {
   const test::TemporaryFolder folder;
   const ScenarioConfig config = load_scenario("demo");

@@ -186,6 +186,21 @@ TEST_CASE("fixes scatter about the antenna with the configured sigma") {
   CHECK(std::abs(correlation(e.east, e.up)) < 0.06);
 }
 
+TEST_CASE("the heading of two antennas scatters about the vehicle's") {
+  ScenarioConfig config = gnss_only();
+  config.gnss.sigma_heading_rad = 0.01;
+  Series error;
+  const SimulatedDrive drive = simulate(config, 12);
+  for (const GnssFix& fix : drive.gnss) {
+    REQUIRE(fix.heading);
+    const Eigen::Vector3d forward = drive.kinematics_at(fix.t_us).T_enu_vehicle.q * Eigen::Vector3d::UnitX();
+    error.push_back(std::remainder(fix.heading->heading - std::atan2(forward.x(), forward.y()), 2.0 * kPi));
+    REQUIRE(fix.heading->heading >= 0.0);
+  }
+  CHECK(near(deviation(error), 0.01, 0.05));
+  CHECK_FALSE(near(deviation(error), 0.0115, 0.05));
+}
+
 TEST_CASE("multipath is correlated over its correlation time") {
   ScenarioConfig config = gnss_only();
   config.duration_s = 3000.0;
