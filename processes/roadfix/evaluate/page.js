@@ -32,6 +32,12 @@ function ticks(low, high, count) {
   return out;
 }
 
+/** The largest of 1, 2, 5 times a power of ten that is not above the value. */
+function niceBelow(value) {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return [5, 2, 1].map((f) => f * power).find((s) => s <= value);
+}
+
 function logTicks(low, high) {
   const out = [];
   for (let p = Math.ceil(Math.log10(low) - 1e-9); p <= Math.log10(high) + 1e-9; ++p) out.push(10 ** p);
@@ -232,7 +238,7 @@ function drawMap() {
     for (let i = 0; i <= 60; ++i) node("rect", { x: pad + i * 2, y: 8, width: 2.5, height: 8, fill: heat(i / 60) }, svg);
     node("text", { x: pad, y: 30, class: "tick" }, svg, `0 to ${digits(top)} m (98 % of the errors)`);
   }
-  const bar = ticks(0, width / 4 / factor, 2).pop() || 1;
+  const bar = niceBelow(width / 4 / factor);
   node("path", { d: `M${pad} ${height - 12}v4h${bar * factor}v-4`, fill: "none", stroke: "var(--muted)" }, svg);
   node("text", { x: pad + bar * factor + 8, y: height - 6, class: "tick" }, svg, `${bar} m`);
 }
