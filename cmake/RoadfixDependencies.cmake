@@ -51,6 +51,9 @@ roadfix_require(OpenCV_FOUND libopencv-dev)
 find_package(embree 3.13 QUIET CONFIG)
 roadfix_require(embree_FOUND libembree-dev)
 
+find_package(Ceres 2.1 QUIET CONFIG)
+roadfix_require(Ceres_FOUND libceres-dev)
+
 if(ROADFIX_TESTS)
   find_package(Catch2 2.13 QUIET CONFIG)
   roadfix_require(Catch2_FOUND catch2)

@@ -6,7 +6,7 @@
 namespace roadfix {
 namespace {
 
-constexpr int kIterations = 20;
+constexpr int kIterations = 30;
 constexpr double kEnoughPx = 0.01;
 constexpr double kMinEigenvalue = 1e-4;  ///< OpenCV's default: flat patches are refused
 constexpr int kLevelsBack = 1;           ///< the way back begins where it should end

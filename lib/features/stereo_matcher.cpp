@@ -50,11 +50,14 @@ double correlation(const Patch& a, const Patch& b) {
 
 StereoMatcher::StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left,
                              const StereoConfig& config)
-    : left_(left),
-      right_(right),
-      T_right_left_(T_right_left),
-      E_(skew(T_right_left.p) * T_right_left.R()),
-      config_(config) {}
+    : left_(left), right_(right), config_(config) {
+  turn(T_right_left);
+}
+
+void StereoMatcher::turn(const SE3& T_right_left) {
+  T_right_left_ = T_right_left;
+  E_ = skew(T_right_left.p) * T_right_left.R();
+}
 
 std::optional<Eigen::Vector2f> StereoMatcher::right_pixel(const Eigen::Vector2d& normalised,
                                                           double inverse_depth) const {

@@ -38,6 +38,9 @@ class StereoMatcher {
  public:
   StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left, const StereoConfig& config);
 
+  /// Takes a better estimate of where the right eye is.
+  void turn(const SE3& T_right_left);
+
   /// The right pixel of each query, or nothing.
   [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat& left, const cv::Mat& right,
                                                                   std::span<const StereoQuery> queries) const;

@@ -1,0 +1,120 @@
+/// How a map begins: at once with stereo, from two pictures that are far enough apart without.
+#include <algorithm>
+#include <cmath>
+
+#include "slam/keyframe_tracker.h"
+#include "slam/two_view.h"
+
+namespace roadfix {
+
+void KeyframeTracker::start_stereo(const CameraFrame& frame) {
+  std::vector<Feature> features = front_end_->track(frame.left, {});
+  make_keyframe(frame, features);
+  if (landmarks_at_keyframe_ < config_.start_points) {
+    out_.reason = "too few points in both pictures";
+    finish_bundle();
+    map_.clear();
+    front_end_->reset();
+    return;
+  }
+  begin_map(frame.t_us);
+}
+
+void KeyframeTracker::begin_map(int64_t t_us) {
+  if (t_good_us_) {
+    ++out_.reset_counter;
+    out_.reset_delta = SE3{};
+  }
+  motion_.reset();
+  out_.state = TrackState::kGood;
+  out_.reason.clear();
+  out_.num_inliers = landmarks_at_keyframe_;
+  accept(t_us, map_.last().T_map_camera, Matrix6d::Zero());
+  motion_.reset();
+}
+
+int KeyframeTracker::count_landmarks(const std::vector<KeyframeFeature>& features) const {
+  int count = 0;
+  for (const KeyframeFeature& f : features) {
+    const Landmark* landmark = map_.find(f.track);
+    count += landmark != nullptr && landmark->p_map ? 1 : 0;
+  }
+  return count;
+}
+
+void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Feature>& features) {
+  start_.emplace();
+  start_->t_us = frame.t_us;
+  std::vector<Feature> all = features;
+  for (const Feature& f : front_end_->replenish()) all.push_back(f);
+  for (const Feature& f : all) {
+    if (const auto normalised = left_.unproject(f.pixel.cast<double>())) start_->seen[f.track] = *normalised;
+  }
+  travelled_ = travelled_variance_ = 0.0;
+  travel_known_ = false;
+}
+
+void KeyframeTracker::start_mono(const CameraFrame& frame) {
+  const std::vector<Feature> features = front_end_->track(frame.left, {});
+  out_.num_expected = front_end_->num_expected();
+  out_.num_matches = static_cast<int>(features.size());
+  out_.state = t_good_us_ ? TrackState::kLost : TrackState::kInitialising;
+  out_.reason = "waiting for parallax";
+  Pairs pairs;
+  std::vector<double> flow;
+  for (const Feature& f : features) {
+    const auto normalised = left_.unproject(f.pixel.cast<double>());
+    if (!start_ || !start_->seen.contains(f.track) || !normalised) continue;
+    pairs.tracks.push_back(f.track);
+    pairs.first.push_back(start_->seen.at(f.track));
+    pairs.second.push_back(*normalised);
+    flow.push_back(left_.focal() * (pairs.second.back() - pairs.first.back()).norm());
+  }
+  if (!start_ || 2 * pairs.tracks.size() < start_->seen.size()) {
+    begin_start(frame, features);
+    return;
+  }
+  std::nth_element(flow.begin(), flow.begin() + static_cast<std::ptrdiff_t>(flow.size() / 2), flow.end());
+  if (flow[flow.size() / 2] >= config_.start_flow_px) finish_start(frame, pairs);
+}
+
+void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs) {
+  TwoViewConfig config;
+  config.focal_px = left_.focal();
+  config.gate_px = config_.gate_px;
+  config.min_angle_deg = config_.min_parallax_deg;
+  config.min_points = config_.start_points;
+  const auto motion = two_view_motion(pairs.first, pairs.second, config);
+  if (!motion) return;
+  double baseline = 1.0;  // a unit of our own
+  if (travel_known_) {
+    baseline = std::max(0.01, travelled_);
+  } else if (motion_ && motion_->dt_s > 0.0) {  // as fast as before the map was lost
+    baseline =
+        std::max(0.01, motion_->T_before_now.p.norm() / motion_->dt_s * seconds_between(start_->t_us, frame.t_us));
+  }
+  std::vector<KeyframeFeature> first, second;
+  std::vector<int64_t> wrong;
+  for (size_t i = 0; i < pairs.tracks.size(); ++i) {
+    if (motion->inlier[i]) {
+      first.push_back({pairs.tracks[i], pairs.first[i], {}});
+      second.push_back({pairs.tracks[i], pairs.second[i], {}});
+    } else {
+      wrong.push_back(pairs.tracks[i]);
+    }
+  }
+  map_.add_keyframe({0, start_->t_us, T_map_camera_, {}, 0.0}, first);
+  const SE3 T_map_second = T_map_camera_ * SE3{motion->T_first_second.q, baseline * motion->T_first_second.p};
+  constexpr double kScaleHold = 1e-3;  // of the baseline: the first distance is the unit
+  map_.add_keyframe({0, frame.t_us, T_map_second, baseline, kScaleHold * baseline}, second);
+  front_end_->drop(wrong);
+  travelled_ = travelled_variance_ = 0.0;
+  landmarks_at_keyframe_ = count_landmarks(second);
+  out_.num_landmarks_seen = landmarks_at_keyframe_;
+  begin_bundle();
+  finish_bundle();
+  start_.reset();
+  begin_map(frame.t_us);
+}
+
+}  // namespace roadfix

@@ -1,0 +1,319 @@
+#include "slam/keyframe_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "geometry/so3.h"
+#include "slam/reprojection.h"
+
+namespace roadfix {
+namespace {
+
+/// How a camera pose's covariance becomes the vehicle's: the lever arm turns attitude error into position error.
+Matrix6d vehicle_covariance(const Matrix6d& cov_camera, const SE3& T_map_camera, const SE3& T_camera_vehicle) {
+  Matrix6d F = Matrix6d::Identity();
+  F.topRightCorner<3, 3>() = -T_map_camera.R() * skew(T_camera_vehicle.p);
+  F.bottomRightCorner<3, 3>() = T_camera_vehicle.R().transpose();
+  return F * cov_camera * F.transpose();
+}
+
+/// The motion `T` stretched in time by `factor`.
+SE3 stretched(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
+
+/// Covariance of a pose after the motion T_before_now, which is known exactly: attitude error becomes position error.
+Matrix6d carried(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_before_now) {
+  Matrix6d F = Matrix6d::Identity();
+  F.topRightCorner<3, 3>() = -T_map_before.R() * skew(T_before_now.p);
+  F.bottomRightCorner<3, 3>() = T_before_now.R().transpose();
+  return F * cov * F.transpose();
+}
+
+}  // namespace
+
+KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig,
+                                 std::unique_ptr<FrontEnd> front_end, Executor& executor)
+    : config_(config),
+      rig_(rig),
+      left_(rig.left),
+      front_end_(std::move(front_end)),
+      executor_(executor),
+      map_(rig, config),
+      T_map_camera_(rig.T_vehicle_left) {
+  if (rig.right) stereo_.emplace(left_, Camera(*rig.right), rig.T_right_left, config.stereo);
+}
+
+KeyframeTracker::~KeyframeTracker() { executor_.wait(); }
+
+const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
+  if (t_us_ && frame.t_us <= *t_us_) return out_;
+  finish_bundle();
+  TrackedFrame fresh;
+  fresh.reset_counter = out_.reset_counter;
+  fresh.reset_delta = out_.reset_delta;
+  fresh.odometry.t_us = frame.t_us;
+  out_ = std::move(fresh);
+  if (const std::string reason = unusable(frame); !reason.empty()) {
+    miss(frame.t_us, reason);
+  } else if (!map_.empty()) {
+    follow(frame);
+  } else if (stereo_ && !frame.right.empty()) {
+    start_stereo(frame);
+  } else {
+    start_mono(frame);
+  }
+  t_us_ = frame.t_us;
+  out_.num_keyframes = map_.num_keyframes_ever();
+  out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
+  return out_;
+}
+
+void KeyframeTracker::travelled(double distance, double sigma) {
+  travelled_ += distance;
+  travelled_variance_ += sigma * sigma;
+  travel_known_ = true;
+}
+
+std::string KeyframeTracker::unusable(const CameraFrame& frame) {
+  const auto fits = [](const cv::Mat& picture, const CameraIntrinsics& lens) {
+    return picture.type() == CV_8UC1 && picture.cols == lens.width && picture.rows == lens.height;
+  };
+  if (!fits(frame.left, rig_.left)) return "the picture does not have the size of the calibration";
+  if (rig_.right && !frame.right.empty() && !fits(frame.right, *rig_.right)) return "the right picture does not fit";
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(frame.left, mean, deviation);
+  out_.brightness = mean[0];
+  if (deviation[0] < config_.min_contrast) return mean[0] < 128.0 ? "the picture is dark" : "the picture is blank";
+  return {};
+}
+
+SE3 KeyframeTracker::predict(int64_t t_us) const {
+  if (!motion_ || !t_us_ || motion_->dt_s <= 0.0) return T_map_camera_;
+  return T_map_camera_ * stretched(motion_->T_before_now, seconds_between(*t_us_, t_us) / motion_->dt_s);
+}
+
+std::optional<Eigen::Vector2d> KeyframeTracker::appears(const Eigen::Vector3d& p_camera) const {
+  if (!(p_camera.z() > kMinReprojectionDepth)) return std::nullopt;
+  return left_.distort(map_.lens().bend(p_camera.hnormalized()));
+}
+
+std::vector<Feature> KeyframeTracker::hints(const SE3& T_map_camera) const {
+  std::vector<Feature> out;
+  const SE3 T_camera_map = T_map_camera.inverse();
+  const Eigen::Quaterniond q_now_before = T_camera_map.q * T_map_camera_.q;
+  for (const auto& [track, pixel] : pixels_) {
+    const Landmark* landmark = map_.find(track);
+    std::optional<Eigen::Vector2d> expected;
+    if (landmark != nullptr && landmark->p_map) {
+      expected = appears(T_camera_map * *landmark->p_map);
+    } else if (const auto before = left_.unproject(pixel.cast<double>())) {
+      expected = appears(q_now_before * map_.lens().straighten(*before).homogeneous());  // as if it were far away
+    }
+    if (expected && left_.sees(*expected)) out.push_back({track, expected->cast<float>()});
+  }
+  return out;
+}
+
+void KeyframeTracker::follow(const CameraFrame& frame) {
+  const SE3 T_predicted = predict(frame.t_us);
+  const std::vector<Feature> features = front_end_->track(frame.left, hints(T_predicted));
+  pixels_.clear();
+  for (const Feature& f : features) pixels_[f.track] = f.pixel;
+  out_.num_expected = front_end_->num_expected();
+  out_.num_matches = static_cast<int>(features.size());
+  if (!solve(features, T_predicted)) {
+    miss(frame.t_us, "too few landmarks agree on a pose");
+    return;
+  }
+  drop_wrong_tracks(features);
+  if (needs_keyframe(features)) make_keyframe(frame, features);
+}
+
+bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_predicted) {
+  std::vector<PosePoint> points;
+  std::vector<size_t> index;
+  for (size_t i = 0; i < features.size(); ++i) {
+    out_.features.push_back({features[i], FeatureUse::kMatched});
+    const Landmark* landmark = map_.find(features[i].track);
+    const auto normalised = left_.unproject(features[i].pixel.cast<double>());
+    if (landmark == nullptr || !landmark->p_map || !normalised) continue;
+    points.push_back({*landmark->p_map, *normalised});
+    index.push_back(i);
+  }
+  out_.num_landmarks_seen = static_cast<int>(points.size());
+  const PoseSolverConfig config{left_.focal(), config_.sigma_px, config_.gate_px, config_.min_inliers, map_.lens()};
+  auto solution = solve_pose(points, T_predicted, config);
+  if (!solution || 2 * solution->num_inliers < static_cast<int>(points.size())) {
+    auto found = search_pose(points, config);
+    if (found && (!solution || found->num_inliers > solution->num_inliers)) solution = std::move(found);
+  }
+  if (!solution) return false;
+  for (size_t k = 0; k < index.size(); ++k) {
+    out_.features[index[k]].use = solution->inlier[k] ? FeatureUse::kInlier : FeatureUse::kOutlier;
+  }
+  out_.num_inliers = solution->num_inliers;
+  out_.rms_px = solution->rms_px;
+  const bool weak = solution->num_inliers < config_.weak_inliers ||
+                    solution->num_inliers < config_.weak_ratio * static_cast<double>(points.size());
+  out_.state = weak ? TrackState::kWeak : TrackState::kGood;
+  if (weak) out_.reason = "few landmarks agree with the pose";
+  accept(out_.odometry.t_us, solution->T_map_camera, config_.alike_sightings * solution->cov);
+  return true;
+}
+
+void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera) {
+  if (t_us_) motion_ = Motion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
+  T_map_camera_ = T_map_camera;
+  t_good_us_ = t_us;
+  const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
+  const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
+  const Matrix6d cov = carried(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
+  Odometry& o = out_.odometry;
+  o.T_frame_vehicle = T_map_camera * T_camera_vehicle;
+  o.cov_pose = vehicle_covariance(cov, T_map_camera, T_camera_vehicle);
+  o.validity = Validity::kValid;
+  if (motion_ && motion_->dt_s > 0.0) {
+    const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * T_camera_vehicle;
+    o.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
+    o.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
+    const Matrix6d cov_vehicle = vehicle_covariance(cov_camera, T_map_camera, T_camera_vehicle);
+    const Eigen::Matrix3d R = o.T_frame_vehicle.R();
+    o.cov_velocity = 2.0 / (motion_->dt_s * motion_->dt_s) * R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R;
+  }
+  out_.scale = stereo_ ? ScaleSource::kStereo : (travel_known_ ? ScaleSource::kTravel : ScaleSource::kNone);
+}
+
+void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
+  std::vector<int64_t> wrong;
+  for (size_t i = 0; i < features.size(); ++i) {
+    if (out_.features[i].use == FeatureUse::kOutlier) wrong.push_back(features[i].track);
+  }
+  front_end_->drop(wrong);
+  map_.forget(wrong);
+  for (const int64_t track : wrong) pixels_.erase(track);
+}
+
+bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const {
+  const Eigen::Quaterniond q_now_keyframe = T_map_camera_.q.conjugate() * map_.last().T_map_camera.q;
+  double flow = 0.0;
+  int count = 0;
+  for (const Feature& f : features) {
+    const Landmark* landmark = map_.find(f.track);
+    if (landmark == nullptr || landmark->sightings.empty()) continue;
+    const Sighting& seen = landmark->sightings.back();
+    const auto now = left_.unproject(f.pixel.cast<double>());
+    if (seen.keyframe != map_.last().id || !now) continue;
+    const Eigen::Vector3d turned = q_now_keyframe * seen.left.homogeneous();  // where turning alone would have put it
+    flow += left_.focal() * (*now - turned.hnormalized()).norm();
+    ++count;
+  }
+  if (count == 0) return true;
+  flow /= count;
+  if (flow < config_.standing_flow_px) return false;
+  return flow > config_.keyframe_flow_px || out_.num_inliers < config_.keyframe_min_share * landmarks_at_keyframe_;
+}
+
+void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features) {
+  std::vector<Feature> all;
+  for (const Feature& f : features) {
+    if (pixels_.contains(f.track)) all.push_back(f);
+  }
+  for (const Feature& f : front_end_->replenish()) {
+    all.push_back(f);
+    pixels_[f.track] = f.pixel;
+    out_.features.push_back({f, FeatureUse::kNew});
+  }
+  std::vector<std::optional<Eigen::Vector2f>> right(all.size());
+  if (stereo_ && !frame.right.empty()) {
+    const SE3 T_camera_map = T_map_camera_.inverse();
+    std::vector<StereoQuery> queries;
+    for (const Feature& f : all) {
+      StereoQuery query{f.pixel, {}};
+      const Landmark* landmark = map_.find(f.track);
+      if (landmark != nullptr && landmark->p_map) {
+        const double depth = (T_camera_map * *landmark->p_map).z();
+        if (depth > kMinReprojectionDepth) query.depth = depth;
+      }
+      queries.push_back(query);
+    }
+    stereo_->turn(map_.lens().turned(rig_.T_right_left));
+    right = stereo_->match(frame.left, frame.right, queries);
+  }
+  std::vector<KeyframeFeature> seen;
+  const Camera right_lens(rig_.right.value_or(rig_.left));
+  for (size_t i = 0; i < all.size(); ++i) {
+    const auto normalised = left_.unproject(all[i].pixel.cast<double>());
+    if (!normalised) continue;
+    seen.push_back({all[i].track, *normalised, {}});
+    if (right[i]) seen.back().right = right_lens.unproject(right[i]->cast<double>());
+  }
+  Keyframe keyframe{0, frame.t_us, T_map_camera_, {}, 0.0};
+  if (travel_known_ && !map_.empty()) {
+    keyframe.travelled = travelled_;
+    keyframe.travelled_sigma = std::sqrt(travelled_variance_);
+  }
+  if (!map_.empty()) {
+    const SE3& T_map_before = map_.last().T_map_camera;
+    cov_keyframe_ = carried(cov_keyframe_, T_map_before, T_map_before.inverse() * T_map_camera_);
+  }
+  map_.add_keyframe(keyframe, seen);
+  travelled_ = travelled_variance_ = 0.0;
+  landmarks_at_keyframe_ = count_landmarks(seen);
+  begin_bundle();
+}
+
+void KeyframeTracker::begin_bundle() {
+  job_ = std::make_unique<BundleJob>(map_.make_bundle());
+  BundleJob* job = job_.get();
+  const int iterations = config_.bundle_iterations;
+  executor_.start([job, iterations] { job->report = adjust(job->problem, iterations); });
+}
+
+void KeyframeTracker::finish_bundle() {
+  if (!job_) return;
+  executor_.wait();
+  const std::vector<int64_t> wrong = map_.apply(*job_);
+  front_end_->drop(wrong);
+  for (const int64_t track : wrong) pixels_.erase(track);
+  T_map_camera_ = map_.last().T_map_camera;  // the frame before this one was the job's last keyframe
+  const auto steps = static_cast<double>(std::max<size_t>(1, job_->keyframes.size() - 1));
+  cov_keyframe_ += (config_.alike_sightings / steps) * job_->report.cov_last;
+  job_.reset();
+}
+
+void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
+  out_.reason = reason;
+  if (map_.empty()) {
+    out_.state = t_good_us_ ? TrackState::kLost : TrackState::kInitialising;
+    return;
+  }
+  const SE3 T_predicted = predict(t_us);
+  const double without_s = seconds_between(*t_good_us_, t_us);
+  T_map_camera_ = T_predicted;
+  if (without_s < config_.lost_after_s) {
+    out_.state = TrackState::kWeak;
+    out_.odometry.T_frame_vehicle = T_predicted * rig_.T_vehicle_left.inverse();
+    out_.odometry.cov_pose = Matrix6d::Identity() * (without_s * without_s);
+    out_.odometry.validity = Validity::kCoasting;
+    return;
+  }
+  out_.state = TrackState::kLost;
+  map_.clear();
+  front_end_->reset();
+  pixels_.clear();
+  start_.reset();
+}
+
+void KeyframeTracker::restart(const SE3& T_local_vehicle, const Matrix6d& cov_pose) {
+  finish_bundle();
+  map_.clear();
+  front_end_->reset();
+  pixels_.clear();
+  start_.reset();
+  motion_.reset();
+  T_map_camera_ = T_local_vehicle * rig_.T_vehicle_left;
+  cov_keyframe_ = cov_pose;
+  ++out_.reset_counter;
+}
+
+}  // namespace roadfix

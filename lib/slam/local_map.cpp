@@ -1,0 +1,169 @@
+#include "slam/local_map.h"
+
+#include <algorithm>
+
+#include "geometry/frames.h"
+#include "slam/reprojection.h"
+#include "slam/triangulation.h"
+
+namespace roadfix {
+
+LocalMap::LocalMap(const CameraRig& rig, const KeyframeTrackerConfig& config)
+    : rig_(rig), config_(config), focal_px_(Camera(rig.left).focal()) {
+  const auto information = [this](double sigma) { return config_.alike_sightings / std::max(1e-12, sigma * sigma); };
+  // Two eyes tell depth by disparity, which every error of a lens resembles: there only the right eye's turn is learnt.
+  const bool stereo = rig.right.has_value();
+  LensCorrection::Vector diagonal;
+  diagonal << information(stereo ? 0.0 : config.focal_std), information(stereo ? 0.0 : config.radial_std),
+      Eigen::Vector3d::Constant(information(config.right_turn_std_deg * kDegree));
+  lens_information_ = diagonal.asDiagonal();
+}
+
+int64_t LocalMap::add_keyframe(const Keyframe& keyframe, std::span<const KeyframeFeature> features) {
+  keyframes_.push_back(keyframe);
+  keyframes_.back().id = next_id_;
+  for (const KeyframeFeature& f : features) {
+    landmarks_[f.track].sightings.push_back({next_id_, f.left, f.right});
+  }
+  forget_old_keyframes();
+  make_points();
+  return next_id_++;
+}
+
+void LocalMap::forget_old_keyframes() {
+  const auto keep = static_cast<size_t>(config_.window + config_.window_fixed);
+  while (keyframes_.size() > keep) keyframes_.pop_front();
+  const int64_t oldest = keyframes_.front().id, newest = keyframes_.back().id;
+  for (auto it = landmarks_.begin(); it != landmarks_.end();) {
+    std::vector<Sighting>& sightings = it->second.sightings;
+    std::erase_if(sightings, [&](const Sighting& s) { return s.keyframe < oldest; });
+    // A track that the newest keyframe does not see has ended: without a point it will never get one.
+    const bool ended = sightings.empty() || sightings.back().keyframe != newest;
+    it = sightings.empty() || (ended && !it->second.p_map) ? landmarks_.erase(it) : std::next(it);
+  }
+}
+
+const Keyframe* LocalMap::keyframe(int64_t id) const {
+  const int64_t first = keyframes_.front().id;
+  if (id < first || id > keyframes_.back().id) return nullptr;
+  return &keyframes_[static_cast<size_t>(id - first)];
+}
+
+const Landmark* LocalMap::find(int64_t track) const {
+  const auto it = landmarks_.find(track);
+  return it == landmarks_.end() ? nullptr : &it->second;
+}
+
+double LocalMap::worst_error_px(const Landmark& landmark, const Eigen::Vector3d& p_map) const {
+  double worst = 0.0;
+  Eigen::Vector2d seen;
+  const auto judge = [&](const Eye& eye, const Eigen::Vector2d& where) {
+    const bool visible = eye.see(p_map, seen);
+    worst = std::max(worst, visible ? focal_px_ * (seen - where).norm() : 1e9);
+  };
+  for (const Sighting& s : landmark.sightings) {
+    const SE3& T_map_camera = keyframe(s.keyframe)->T_map_camera;
+    judge(Eye(T_map_camera, lens_), s.left);
+    if (s.right) judge(Eye(T_map_camera, lens_, rig_.T_right_left), *s.right);
+  }
+  return worst;
+}
+
+std::optional<Eigen::Vector3d> LocalMap::locate(const Landmark& landmark) const {
+  std::vector<Ray> rays;
+  const SE3 T_left_right = lens_.turned(rig_.T_right_left).inverse();
+  for (const Sighting& s : landmark.sightings) {
+    const SE3& T_map_camera = keyframe(s.keyframe)->T_map_camera;
+    rays.push_back(ray(T_map_camera, lens_.straighten(s.left)));
+    if (s.right) rays.push_back(ray(T_map_camera * T_left_right, lens_.straighten(*s.right)));
+  }
+  const bool stereo = landmark.sightings.back().right.has_value();
+  const double angle = stereo ? config_.min_disparity_px / focal_px_ : config_.min_parallax_deg * kDegree;
+  const auto p = triangulate(rays, angle);
+  if (!p || worst_error_px(landmark, *p) > config_.gate_px) return std::nullopt;
+  return p;
+}
+
+void LocalMap::make_points() {
+  for (auto& [track, landmark] : landmarks_) {
+    if (!landmark.p_map) landmark.p_map = locate(landmark);
+  }
+}
+
+size_t LocalMap::num_fixed() const {
+  const auto window = static_cast<size_t>(config_.window);
+  return keyframes_.size() > window + 1 ? keyframes_.size() - window : 1;
+}
+
+BundleJob LocalMap::make_bundle() const {
+  BundleJob job;
+  BundleProblem& problem = job.problem;
+  problem.T_right_left = rig_.T_right_left;
+  problem.focal_px = focal_px_;
+  problem.sigma_px = config_.sigma_px;
+  problem.lens = problem.lens_prior = lens_;
+  problem.lens_information = lens_information_;
+  const size_t fixed = num_fixed();
+  for (const Keyframe& k : keyframes_) {
+    problem.views.push_back({k.T_map_camera, problem.views.size() < fixed});
+    job.keyframes.push_back(k.id);
+    const int view = static_cast<int>(problem.views.size()) - 1;
+    if (view > 0 && k.travelled) problem.distances.push_back({view - 1, view, *k.travelled, k.travelled_sigma});
+  }
+  const int64_t first = keyframes_.front().id, first_free = first + static_cast<int64_t>(fixed);
+  for (const auto& [track, landmark] : landmarks_) {
+    const std::vector<Sighting>& seen = landmark.sightings;
+    const bool several = seen.size() >= 2 || (seen.size() == 1 && seen.front().right);
+    if (!landmark.p_map || !several || seen.back().keyframe < first_free) continue;
+    const int point = static_cast<int>(problem.points.size());
+    problem.points.push_back(*landmark.p_map);
+    job.tracks.push_back(track);
+    for (const Sighting& s : seen) {
+      const int view = static_cast<int>(s.keyframe - first);
+      problem.observations.push_back({view, point, false, s.left});
+      if (s.right) problem.observations.push_back({view, point, true, *s.right});
+    }
+  }
+  return job;
+}
+
+std::vector<int64_t> LocalMap::apply(const BundleJob& job) {
+  for (size_t i = 0; i < job.keyframes.size(); ++i) {
+    for (Keyframe& k : keyframes_) {
+      if (k.id == job.keyframes[i]) k.T_map_camera = job.problem.views[i].T_map_camera;
+    }
+  }
+  for (size_t i = 0; i < job.tracks.size(); ++i) {
+    const auto it = landmarks_.find(job.tracks[i]);
+    if (it != landmarks_.end()) it->second.p_map = job.problem.points[i];
+  }
+  learn_lens(job);
+  std::vector<int64_t> wrong;
+  for (size_t i = 0; i < job.report.error_px.size(); ++i) {
+    if (job.report.error_px[i] <= config_.gate_px) continue;
+    const BundleProblem::Observation& o = job.problem.observations[i];
+    const int64_t track = job.tracks[static_cast<size_t>(o.point)];
+    if (wrong.empty() || wrong.back() != track) wrong.push_back(track);
+  }
+  forget(wrong);
+  return wrong;
+}
+
+void LocalMap::learn_lens(const BundleJob& job) {
+  lens_ = job.problem.lens;
+  // What this window added. The next windows share most of it: each counts for its share only, (M.15).
+  const double share = 1.0 / static_cast<double>(job.keyframes.size());
+  const LensCorrection::Matrix added = job.report.lens_cov.inverse() - job.problem.lens_information;
+  if (added.allFinite()) lens_information_ += share * 0.5 * (added + added.transpose());
+}
+
+void LocalMap::forget(std::span<const int64_t> tracks) {
+  for (const int64_t track : tracks) landmarks_.erase(track);
+}
+
+void LocalMap::clear() {
+  keyframes_.clear();
+  landmarks_.clear();
+}
+
+}  // namespace roadfix

@@ -1,0 +1,93 @@
+/// The last keyframes, the landmarks they see, and what keeps them consistent. A landmark has the number of its track.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "slam/bundle.h"
+#include "slam/config.h"
+
+namespace roadfix {
+
+/// One landmark in one keyframe, normalised coordinates.
+struct Sighting {
+  int64_t keyframe = 0;
+  Eigen::Vector2d left;
+  std::optional<Eigen::Vector2d> right;
+};
+
+struct Landmark {
+  std::optional<Eigen::Vector3d> p_map;  ///< m, once two rays have made it a point
+  std::vector<Sighting> sightings;       ///< in ascending order of keyframe
+};
+
+struct Keyframe {
+  int64_t id = 0;
+  int64_t t_us = 0;
+  SE3 T_map_camera;                 ///< of the left eye
+  std::optional<double> travelled;  ///< m since the keyframe before, where something other than the pictures says so
+  double travelled_sigma = 0.0;     ///< m
+};
+
+/// What a keyframe sees of one track.
+struct KeyframeFeature {
+  int64_t track = 0;
+  Eigen::Vector2d left;
+  std::optional<Eigen::Vector2d> right;
+};
+
+/// A bundle adjustment taken out of the map, so that it can be solved beside the tracking.
+struct BundleJob {
+  BundleProblem problem;
+  std::vector<int64_t> keyframes;  ///< one per view
+  std::vector<int64_t> tracks;     ///< one per point
+  BundleReport report;
+};
+
+class LocalMap {
+ public:
+  LocalMap(const CameraRig& rig, const KeyframeTrackerConfig& config);
+
+  /// Adds a keyframe, makes points of the landmarks that have enough parallax by now, and forgets the keyframes that
+  /// left the window. Returns its id.
+  int64_t add_keyframe(const Keyframe& keyframe, std::span<const KeyframeFeature> features);
+
+  [[nodiscard]] BundleJob make_bundle() const;
+  /// Takes the result in; returns the tracks that turned out wrong, ascending, which the map has forgotten.
+  std::vector<int64_t> apply(const BundleJob& job);
+
+  /// Forgets landmarks (ascending).
+  void forget(std::span<const int64_t> tracks);
+  void clear();
+
+  [[nodiscard]] bool empty() const { return keyframes_.empty(); }
+  [[nodiscard]] const std::deque<Keyframe>& keyframes() const { return keyframes_; }
+  [[nodiscard]] const Keyframe& last() const { return keyframes_.back(); }
+  [[nodiscard]] const std::map<int64_t, Landmark>& landmarks() const { return landmarks_; }
+  [[nodiscard]] const Landmark* find(int64_t track) const;
+  [[nodiscard]] const LensCorrection& lens() const { return lens_; }
+  [[nodiscard]] int64_t num_keyframes_ever() const { return next_id_; }
+
+ private:
+  void make_points();
+  void learn_lens(const BundleJob& job);
+  void forget_old_keyframes();
+  [[nodiscard]] const Keyframe* keyframe(int64_t id) const;
+  [[nodiscard]] std::optional<Eigen::Vector3d> locate(const Landmark& landmark) const;
+  [[nodiscard]] double worst_error_px(const Landmark& landmark, const Eigen::Vector3d& p_map) const;
+  [[nodiscard]] size_t num_fixed() const;
+
+  CameraRig rig_;
+  KeyframeTrackerConfig config_;
+  double focal_px_;
+  std::deque<Keyframe> keyframes_;
+  std::map<int64_t, Landmark> landmarks_;
+  int64_t next_id_ = 0;
+  LensCorrection lens_;
+  LensCorrection::Matrix lens_information_;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,114 @@
+#include "slam/normal_equations.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int kLens = LensCorrection::kSize;
+constexpr double kMinPointInformation = 1e-9;  ///< keeps a point without parallax where it is
+
+}  // namespace
+
+NormalEquations::NormalEquations(int num_free_views, size_t num_points)
+    : lens_row_(6 * num_free_views),
+      H_(Eigen::MatrixXd::Zero(lens_row_ + kLens, lens_row_ + kLens)),
+      b_(Eigen::VectorXd::Zero(lens_row_ + kLens)),
+      points_(num_points) {}
+
+void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual,
+                          double weight) {
+  Point& p = points_[point];
+  const Eigen::Matrix<double, 3, 2> Jp = weight * J.point.transpose();
+  p.H.noalias() += Jp * J.point;
+  p.b.noalias() += Jp * residual;
+  const Eigen::Matrix<double, kLens, 2> Jl = weight * J.correction.transpose();
+  p.W_lens.noalias() += Jl * J.point;
+  H_.block<kLens, kLens>(lens_row_, lens_row_).noalias() += Jl * J.correction;
+  b_.segment<kLens>(lens_row_).noalias() += Jl * residual;
+  if (free_view < 0) return;
+  const Eigen::Matrix<double, 6, 2> Jv = weight * J.pose.transpose();
+  const int row = 6 * free_view;
+  H_.block<6, 6>(row, row).noalias() += Jv * J.pose;
+  H_.block<kLens, 6>(lens_row_, row).noalias() += Jl * J.pose;
+  b_.segment<6>(row).noalias() += Jv * residual;
+  if (p.links_end == links_.size() && p.links_end > 0 && links_.back().free_view == free_view) {
+    links_.back().W.noalias() += Jv * J.point;  // the other eye of the same view
+  } else {
+    links_.push_back({free_view, Jv * J.point});
+    p.links_end = links_.size();
+  }
+}
+
+void NormalEquations::add_distance(int free_a, int free_b, const Eigen::Vector3d& J_b, double residual) {
+  const Eigen::Matrix3d H = J_b * J_b.transpose();
+  if (free_a >= 0) {
+    H_.block<3, 3>(6 * free_a, 6 * free_a) += H;
+    b_.segment<3>(6 * free_a) -= residual * J_b;
+  }
+  if (free_b >= 0) {
+    H_.block<3, 3>(6 * free_b, 6 * free_b) += H;
+    b_.segment<3>(6 * free_b) += residual * J_b;
+  }
+  if (free_a >= 0 && free_b >= 0) H_.block<3, 3>(6 * std::max(free_a, free_b), 6 * std::min(free_a, free_b)) -= H;
+}
+
+void NormalEquations::add_lens_prior(const LensCorrection::Matrix& information,
+                                     const LensCorrection::Vector& residual) {
+  H_.block<kLens, kLens>(lens_row_, lens_row_) += information;
+  b_.segment<kLens>(lens_row_) += information * residual;
+}
+
+NormalEquations::Reduced NormalEquations::reduce(double damping) const {
+  Reduced r{H_, b_, {}};
+  r.S.diagonal() *= 1.0 + damping;
+  r.inverse_H.reserve(points_.size());
+  std::vector<Matrix63d> Y;
+  size_t begin = 0;
+  for (const Point& point : points_) {
+    Eigen::Matrix3d H = point.H;
+    H.diagonal() *= 1.0 + damping;
+    H.diagonal().array() += kMinPointInformation;
+    r.inverse_H.emplace_back(H.inverse());
+    const MatrixL3d Y_lens = point.W_lens * r.inverse_H.back();
+    r.S.block<kLens, kLens>(lens_row_, lens_row_).noalias() -= Y_lens * point.W_lens.transpose();
+    r.s.segment<kLens>(lens_row_).noalias() -= Y_lens * point.b;
+    const size_t end = std::max(begin, point.links_end);
+    Y.clear();
+    for (size_t i = begin; i < end; ++i) {
+      const int row = 6 * links_[i].free_view;
+      Y.emplace_back(links_[i].W * r.inverse_H.back());
+      r.s.segment<6>(row).noalias() -= Y.back() * point.b;
+      r.S.block<kLens, 6>(lens_row_, row).noalias() -= Y_lens * links_[i].W.transpose();
+      for (size_t j = begin; j <= i; ++j) {  // views ascend within a point: the lower triangle
+        r.S.block<6, 6>(row, 6 * links_[j].free_view).noalias() -= Y.back() * links_[j].W.transpose();
+      }
+    }
+    begin = end;
+  }
+  return r;
+}
+
+NormalEquations::Step NormalEquations::solve(double damping) const {
+  const Reduced r = reduce(damping);
+  const Eigen::VectorXd x = r.S.selfadjointView<Eigen::Lower>().ldlt().solve(r.s);
+  Step step{x.head(lens_row_), x.tail<kLens>(), {}};
+  step.points.reserve(points_.size());
+  size_t begin = 0;
+  for (size_t p = 0; p < points_.size(); ++p) {  // (M.12)
+    Eigen::Vector3d b = points_[p].b - points_[p].W_lens.transpose() * step.lens;
+    const size_t end = std::max(begin, points_[p].links_end);
+    for (size_t i = begin; i < end; ++i) {
+      b.noalias() -= links_[i].W.transpose() * step.views.segment<6>(6 * links_[i].free_view);
+    }
+    begin = end;
+    step.points.emplace_back(r.inverse_H[p] * b);
+  }
+  return step;
+}
+
+Eigen::MatrixXd NormalEquations::covariance() const {
+  const Reduced r = reduce(0.0);
+  const Eigen::Index n = r.S.rows();
+  return r.S.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+}
+
+}  // namespace roadfix

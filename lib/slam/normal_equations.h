@@ -1,0 +1,66 @@
+/// Gauss-Newton's normal equations of a bundle adjustment and their reduction: points out, cameras and lens stay.
+/// MODEL.md (M.9)-(M.12).
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "slam/reprojection.h"
+
+namespace roadfix {
+
+/// Unknowns: six for each free view, then the lens correction, then three for each point.
+class NormalEquations {
+ public:
+  NormalEquations(int num_free_views, size_t num_points);
+
+  /// One observation, residual and derivatives already divided by sigma; `free_view` is -1 for a fixed one.
+  /// Observations come in ascending order of point, then of view.
+  void add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual, double weight);
+
+  /// A residual on the positions of two views; either may be fixed (-1).
+  void add_distance(int free_a, int free_b, const Eigen::Vector3d& J_b, double residual);
+
+  /// What is known of the lens beforehand.
+  void add_lens_prior(const LensCorrection::Matrix& information, const LensCorrection::Vector& residual);
+
+  struct Step {
+    Eigen::VectorXd views;
+    LensCorrection::Vector lens;
+    std::vector<Eigen::Vector3d> points;
+  };
+  /// Levenberg and Marquardt's step: diagonal times (1 + damping).
+  [[nodiscard]] Step solve(double damping) const;
+
+  /// Inverse of the reduced system: covariance of views and lens, points marginalised, (M.13).
+  [[nodiscard]] Eigen::MatrixXd covariance() const;
+
+ private:
+  using Matrix63d = Eigen::Matrix<double, 6, 3>;
+  using MatrixL3d = Eigen::Matrix<double, LensCorrection::kSize, 3>;
+
+  struct Link {  ///< between a view and a point
+    int free_view = 0;
+    Matrix63d W;
+  };
+  struct Point {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();
+    MatrixL3d W_lens = MatrixL3d::Zero();
+    size_t links_end = 0;  ///< its links end here, and begin where the point before has its end
+  };
+  struct Reduced {
+    Eigen::MatrixXd S;  ///< lower triangle
+    Eigen::VectorXd s;
+    std::vector<Eigen::Matrix3d> inverse_H;  ///< per point, damped
+  };
+  [[nodiscard]] Reduced reduce(double damping) const;
+
+  int lens_row_;
+  Eigen::MatrixXd H_;  ///< of views and lens, lower triangle
+  Eigen::VectorXd b_;
+  std::vector<Point> points_;
+  std::vector<Link> links_;
+};
+
+}  // namespace roadfix

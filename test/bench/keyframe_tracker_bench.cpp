@@ -1,0 +1,197 @@
+/// Runs the keyframe tracker over a folder in KITTI's odometry layout and prints error and cost.
+///   keyframe_tracker_bench FOLDER [--mono] [--first N] [--count N] [--from N] [--front-end klt|orb|sift|superpoint]
+/// CPU is the whole process's, all threads, from before the first frame to after the last; pictures are decoded outside
+/// of it and their cost is printed apart.
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "geometry/determinism.h"
+#include "slam/keyframe_tracker.h"
+
+namespace roadfix {
+namespace {
+
+double cpu_ms() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto ms = [](const timeval& t) {
+    return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_usec);
+  };
+  return ms(usage.ru_utime) + ms(usage.ru_stime);
+}
+
+struct Sequence {
+  CameraRig rig;
+  std::vector<int64_t> t_us;
+  std::vector<Eigen::Vector3d> reference;
+};
+
+Sequence load(const std::filesystem::path& folder, bool mono) {
+  Sequence s;
+  std::map<std::string, std::vector<double>> calibration;
+  std::ifstream calib(folder / "calib.txt");
+  for (std::string line; std::getline(calib, line);) {
+    std::istringstream words(line);
+    std::string key;
+    words >> key;
+    for (double value = 0; words >> value;) calibration[key].push_back(value);
+  }
+  const auto& p0 = calibration.at("P0:");
+  const auto& p1 = calibration.at("P1:");
+  s.rig.left.fx = s.rig.left.fy = p0.at(0);
+  s.rig.left.cx = p0.at(2);
+  s.rig.left.cy = p0.at(6);
+  const cv::Mat picture = cv::imread((folder / "image_0" / "000000.png").string(), cv::IMREAD_GRAYSCALE);
+  s.rig.left.width = picture.cols;
+  s.rig.left.height = picture.rows;
+  if (!mono) {
+    s.rig.right = s.rig.left;
+    s.rig.T_right_left.p.x() = p1.at(3) / p1.at(0);
+  }
+  std::ifstream times(folder / "times.txt");
+  for (double t = 0; times >> t;) s.t_us.push_back(std::llround(t * 1e6) + 1);
+  std::ifstream poses(folder / "poses.txt");
+  for (std::array<double, 12> T{}; poses >> T[0];) {
+    for (size_t i = 1; i < 12; ++i) poses >> T[i];
+    s.reference.emplace_back(T[3], T[7], T[11]);
+  }
+  return s;
+}
+
+/// RMSE of positions after the best SE3 or Sim3 (Umeyama 1991).
+double ate(const std::vector<Eigen::Vector3d>& estimate, const std::vector<Eigen::Vector3d>& reference, bool scale) {
+  const auto n = static_cast<Eigen::Index>(estimate.size());
+  Eigen::MatrixXd from(3, n), to(3, n);  // rows fixed at compile time make GCC 12 warn inside Eigen
+  for (Eigen::Index i = 0; i < n; ++i) {
+    from.col(i) = estimate[static_cast<size_t>(i)];
+    to.col(i) = reference[static_cast<size_t>(i)];
+  }
+  const Eigen::Matrix4d T = Eigen::umeyama(from, to, scale);
+  if (scale) std::printf("scale %.4f ", T.topLeftCorner<3, 3>().col(0).norm());
+  return std::sqrt((T.topRows<3>() * from.colwise().homogeneous() - to).squaredNorm() / static_cast<double>(n));
+}
+
+/// Sets one configuration key from text, in whatever group it stands.
+struct Setter {
+  std::string key, text;
+  bool done = false;
+  void number(const char* name, double& x, double, double) {
+    if (name == key) x = std::stod(text), done = true;
+  }
+  void integer(const char* name, int& x, int, int) {
+    if (name == key) x = std::stoi(text), done = true;
+  }
+  template <class T>
+  void choice(const char* name, T& x, std::initializer_list<std::pair<const char*, T>> values) {
+    for (const auto& [word, value] : values) {
+      if (name == key && text == word) x = value, done = true;
+    }
+  }
+  template <class T>
+  void group(const char*, T& x) {
+    visit(x, *this);
+  }
+};
+
+int run(int argc, char** argv) {
+  std::filesystem::path folder;
+  bool mono = false, verbose = false;
+  int first = 0, count = 100000, from = 16;
+  KeyframeTrackerConfig config;
+  for (int i = 1; i < argc; ++i) {
+    const std::string a = argv[i];
+    const auto value = [&] {
+      return i + 1 < argc ? std::string(argv[++i]) : throw std::runtime_error(a + " needs a value");
+    };
+    if (a == "--mono")
+      mono = true;
+    else if (a == "--verbose")
+      verbose = true;
+    else if (a == "--first")
+      first = std::stoi(value());
+    else if (a == "--count")
+      count = std::stoi(value());
+    else if (a == "--from")
+      from = std::stoi(value());
+    else if (a == "--set") {
+      const std::string kv = value();
+      const auto eq = kv.find('=');
+      Setter setter{kv.substr(0, eq), kv.substr(eq + 1)};
+      visit(config, setter);
+      if (!setter.done) throw std::runtime_error("unknown key " + kv);
+    } else
+      folder = a;
+  }
+  fix_eigen_blocking();
+  fix_opencv_threads();
+  const Sequence s = load(folder, mono);
+  InlineExecutor executor;
+  KeyframeTracker tracker(config, s.rig, make_front_end(config.front_end), executor);
+  std::vector<Eigen::Vector3d> estimate, reference;
+  std::vector<double> cost;
+  double decode = 0.0, inliers = 0.0;
+  int valid = 0, frames = 0;
+  for (int i = first; i < std::min<int>(first + count, static_cast<int>(s.t_us.size())); ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "%06d.png", i);
+    const double t0 = cpu_ms();
+    CameraFrame frame{
+        s.t_us[static_cast<size_t>(i)], cv::imread((folder / "image_0" / name).string(), cv::IMREAD_GRAYSCALE), {}};
+    if (!mono && std::filesystem::exists(folder / "image_1" / name))
+      frame.right = cv::imread((folder / "image_1" / name).string(), cv::IMREAD_GRAYSCALE);
+    const double t1 = cpu_ms();
+    const TrackedFrame& out = tracker.process(frame);
+    const double t2 = cpu_ms();
+    decode += t1 - t0;
+    cost.push_back(t2 - t1);
+    ++frames;
+    const bool ok = out.odometry.validity != Validity::kInvalid;
+    valid += ok ? 1 : 0;
+    inliers += out.num_landmarks_seen > 0 ? static_cast<double>(out.num_inliers) / out.num_landmarks_seen : 0.0;
+    if (verbose)
+      std::printf("%d state %d match %d/%d inl %d/%d rms %.3f kf %ld lm %ld cpu %.1f p %.3f %.3f %.3f sigma %.3f %s\n",
+                  i, static_cast<int>(out.state), out.num_matches, out.num_expected, out.num_inliers,
+                  out.num_landmarks_seen, out.rms_px, out.num_keyframes, out.num_landmarks, t2 - t1,
+                  out.odometry.T_frame_vehicle.p.x(), out.odometry.T_frame_vehicle.p.y(),
+                  out.odometry.T_frame_vehicle.p.z(), std::sqrt(out.odometry.cov_pose.topLeftCorner<3, 3>().trace()),
+                  out.reason.c_str());
+    if (ok && i >= from && static_cast<size_t>(i) < s.reference.size()) {
+      estimate.push_back(out.odometry.T_frame_vehicle.p);
+      reference.push_back(s.reference[static_cast<size_t>(i)]);
+    }
+  }
+  std::printf("lens %.4f %.4f %.5f %.5f %.5f ", tracker.lens().value(0), tracker.lens().value(1),
+              tracker.lens().value(2), tracker.lens().value(3), tracker.lens().value(4));
+  double total = 0.0;
+  for (const double c : cost) total += c;
+  std::sort(cost.begin(), cost.end());
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::printf(
+      "valid %d/%d ate_se3 %.3f m ate_sim3 %.3f m cpu %.2f ms p99 %.2f ms (decode %.2f) inliers %.3f keyframes %ld rss "
+      "%.0f MB\n",
+      valid, frames, ate(estimate, reference, false), ate(estimate, reference, true), total / frames,
+      cost[cost.size() * 99 / 100], decode / frames, inliers / frames, tracker.last().num_keyframes,
+      static_cast<double>(usage.ru_maxrss) / 1024.0);
+  return 0;
+}
+
+}  // namespace
+}  // namespace roadfix
+
+int main(int argc, char** argv) {
+  try {
+    return roadfix::run(argc, argv);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "keyframe_tracker_bench: %s\n", e.what());
+    return 2;
+  }
+}

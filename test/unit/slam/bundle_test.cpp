@@ -1,0 +1,139 @@
+#include "slam/bundle.h"
+
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "geometry/so3.h"
+#include "unit/slam/ceres_reference.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kFocal = 700.0;
+
+struct Scene {
+  BundleProblem problem;
+  std::vector<SE3> true_views;
+  std::vector<Eigen::Vector3d> true_points;
+};
+
+/// A short drive, mono or stereo, with noise on the pictures and on the start values.
+Scene make_scene(unsigned seed, bool stereo, double sigma_px, double start_error) {
+  std::mt19937 random(seed);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto normal = [&](double sigma) { return std::normal_distribution<double>(0.0, sigma)(random); };
+  Scene s;
+  BundleProblem& b = s.problem;
+  b.focal_px = kFocal;
+  b.sigma_px = 0.5;
+  b.huber = 3.0;
+  b.T_right_left.p.x() = -0.5;
+  b.lens_information *= 1e12;
+  for (int i = 0; i < 6; ++i) {
+    s.true_views.push_back({exp_q({0.0, 0.02 * i, 0.0}), {0.05 * i * i, 0.0, 1.0 * i}});
+    SE3 start = s.true_views.back();
+    const bool fixed = stereo ? i < 1 : i < 2;
+    if (!fixed) {
+      Vector6d d;
+      for (int k = 0; k < 6; ++k) d(k) = normal(k < 3 ? start_error : 0.05 * start_error);
+      start = retract(start, d);
+    }
+    b.views.push_back({start, fixed});
+  }
+  for (int i = 0; i < 120; ++i) {
+    const double z = uniform(8.0, 40.0);
+    const double x = uniform(-0.5, 0.5) * z;
+    const Eigen::Vector3d p(x, uniform(-0.2, 0.2) * z, z);
+    const int point = static_cast<int>(b.points.size());
+    s.true_points.push_back(p);
+    b.points.emplace_back(p * (1.0 + normal(0.3 * start_error)));
+    for (int v = 0; v < 6; ++v) {
+      const SE3& T = s.true_views[static_cast<size_t>(v)];
+      for (const bool right : {false, true}) {
+        if (right && !stereo) continue;
+        Eigen::Vector2d seen;
+        const Eye eye = right ? Eye(T, {}, b.T_right_left) : Eye(T, {});
+        if (!eye.see(p, seen)) continue;
+        seen.x() += normal(sigma_px / kFocal);
+        seen.y() += normal(sigma_px / kFocal);
+        b.observations.push_back({v, point, right, seen});
+      }
+    }
+  }
+  return s;
+}
+
+double worst_position_error(const Scene& s) {
+  double worst = 0.0;
+  for (size_t v = 0; v < s.true_views.size(); ++v) {
+    worst = std::max(worst, (s.problem.views[v].T_map_camera.p - s.true_views[v].p).norm());
+  }
+  return worst;
+}
+
+TEST_CASE("bundle adjustment is exact without noise") {
+  for (const bool stereo : {false, true}) {
+    Scene s = make_scene(1, stereo, 0.0, 0.1);
+    const BundleReport report = adjust(s.problem, 20);
+    CHECK(report.cost_after < 1e-9 * report.cost_before);
+    CHECK(worst_position_error(s) < 1e-5);
+  }
+}
+
+TEST_CASE("bundle adjustment finds the same minimum as Ceres") {
+  Scene s = make_scene(4, true, 0.7, 0.05);
+  const test::CeresResult ceres = test::adjust_with_ceres(s.problem);
+  const BundleReport report = adjust(s.problem, 50);
+  CHECK(report.cost_after == Approx(ceres.cost).epsilon(1e-4));
+  for (size_t v = 0; v < ceres.views.size(); ++v) {
+    const Vector6d difference = local(ceres.views[v], s.problem.views[v].T_map_camera);
+    CHECK(difference.head<3>().norm() < 1e-3);
+    CHECK(difference.tail<3>().norm() < 1e-4);
+  }
+}
+
+TEST_CASE("the last view's covariance is that of its errors") {
+  constexpr int kRuns = 40;
+  const auto mean_nees = [](double sigma_px) {
+    double sum = 0.0;
+    for (unsigned seed = 0; seed < kRuns; ++seed) {
+      Scene s = make_scene(50 + seed, true, sigma_px, 0.02);
+      const BundleReport report = adjust(s.problem, 15);
+      const Vector6d e = local(s.problem.views.back().T_map_camera, s.true_views.back());
+      sum += e.dot(report.cov_last.ldlt().solve(e)) / 6.0;
+    }
+    return sum / kRuns;
+  };
+  const double nees = mean_nees(0.5);
+  CHECK(nees > 0.72);  // 99.9 % of 240 degrees of freedom: 0.72 to 1.32
+  CHECK(nees < 1.32);
+  CHECK(mean_nees(1.0) > 2.0);  // teeth
+}
+
+TEST_CASE("a wrong focal length and a turned right eye are found") {
+  Scene s = make_scene(9, true, 0.2, 0.0);
+  LensCorrection truth;
+  truth.value << 0.01, 0.02, 0.002, -0.001, 0.003;
+  for (auto& o : s.problem.observations) {
+    const SE3& T = s.true_views[static_cast<size_t>(o.view)];
+    const Eigen::Vector3d& p = s.true_points[static_cast<size_t>(o.point)];
+    REQUIRE((o.right ? Eye(T, truth, s.problem.T_right_left) : Eye(T, truth)).see(p, o.normalised));
+  }
+  s.problem.lens_information = LensCorrection::Matrix::Identity();
+  (void)adjust(s.problem, 30);
+  CHECK((s.problem.lens.value - truth.value).norm() < 1e-4);
+}
+
+TEST_CASE("a distance between views gives mono its scale") {
+  Scene s = make_scene(12, false, 0.1, 0.0);
+  s.problem.views[1].fixed = false;
+  s.problem.distances.push_back({0, 1, 2.0 * s.true_views[1].p.norm(), 0.01});
+  (void)adjust(s.problem, 50);
+  const double scale = s.problem.views[5].T_map_camera.p.norm() / s.true_views[5].p.norm();
+  CHECK(scale == Approx(2.0).epsilon(0.01));
+}
+
+}  // namespace
+}  // namespace roadfix

@@ -1,0 +1,198 @@
+/// The whole tracker on a small made-up street.
+#include <catch2/catch.hpp>
+#include <cstring>
+
+#include "geometry/determinism.h"
+#include "geometry/so3.h"
+#include "slam/keyframe_tracker.h"
+#include "support/street.h"
+
+namespace roadfix {
+namespace {
+
+const CameraIntrinsics kLens{480, 160, 280.0, 280.0, 240.0, 80.0, Distortion::kNone, {}};
+constexpr int kFrames = 40;
+
+/// A drive: 0.8 m a frame, then a bend.
+SE3 true_pose(int frame) {
+  SE3 T;
+  for (int i = 0; i < frame; ++i) T = T * SE3{exp_q({0.0, i > 15 ? 0.02 : 0.0, 0.0}), {0.0, 0.0, 0.8}};
+  return T;
+}
+
+CameraRig rig(bool stereo) {
+  CameraRig r;
+  r.left = kLens;
+  if (stereo) {
+    r.right = kLens;
+    r.T_right_left.p.x() = -0.5;
+  }
+  return r;
+}
+
+/// Every picture of the drive, made once.
+const std::vector<CameraFrame>& drive() {
+  static const std::vector<CameraFrame> kDrive = [] {
+    fix_eigen_blocking();
+    fix_opencv_threads();
+    const test::Street street(3);
+    std::vector<CameraFrame> frames;
+    for (int i = 0; i < kFrames; ++i) {
+      const SE3 T = true_pose(i);
+      const auto seed = static_cast<unsigned>(2 * i + 1);
+      frames.push_back({100'000 * (i + 1), street.picture(T, kLens, 2.0, seed),
+                        street.picture(T * rig(true).T_right_left.inverse(), kLens, 2.0, seed + 1)});
+    }
+    return frames;
+  }();
+  return kDrive;
+}
+
+struct Run {
+  InlineExecutor executor;
+  KeyframeTracker tracker;
+  explicit Run(bool stereo, const KeyframeTrackerConfig& config = {})
+      : tracker(config, rig(stereo), make_front_end(config.front_end), executor) {}
+};
+
+TEST_CASE("stereo follows the drive to a percent and says how well") {
+  Run run(true);
+  int valid = 0;
+  for (const CameraFrame& frame : drive()) {
+    const TrackedFrame& out = run.tracker.process(frame);
+    valid += out.odometry.validity == Validity::kValid ? 1 : 0;
+    CHECK(out.scale == ScaleSource::kStereo);
+  }
+  CHECK(valid == kFrames);
+  const Vector6d error = local(run.tracker.last().odometry.T_frame_vehicle, true_pose(kFrames - 1));
+  CHECK(error.head<3>().norm() < 0.01 * 0.8 * kFrames);
+  CHECK(error.tail<3>().norm() < 0.015);
+  const Matrix6d& cov = run.tracker.last().odometry.cov_pose;
+  CHECK(error.dot(cov.ldlt().solve(error)) < 6.0 * 6.0);
+  CHECK(std::sqrt(cov(2, 2)) < 0.5);
+  CHECK(run.tracker.last().odometry.velocity.norm() == Approx(8.0).epsilon(0.05));
+  CHECK(run.tracker.last().reset_counter == 0);
+}
+
+TEST_CASE("mono follows the drive up to scale, and to scale where the wheels tell") {
+  for (const bool wheels : {false, true}) {
+    Run run(false);
+    SE3 first;
+    int first_frame = -1;
+    for (int i = 0; i < kFrames; ++i) {
+      if (wheels && i > 0) run.tracker.travelled(0.8, 0.01);
+      const TrackedFrame& out = run.tracker.process(drive()[static_cast<size_t>(i)]);
+      if (out.odometry.validity == Validity::kValid && first_frame < 0) {
+        first_frame = i;
+        first = out.odometry.T_frame_vehicle;
+      }
+    }
+    REQUIRE(first_frame >= 0);
+    CHECK(first_frame < 8);
+    const TrackedFrame& out = run.tracker.last();
+    CHECK(out.scale == (wheels ? ScaleSource::kTravel : ScaleSource::kNone));
+    const Eigen::Vector3d moved = first.q.conjugate() * (out.odometry.T_frame_vehicle.p - first.p);
+    const Eigen::Vector3d truth = (true_pose(first_frame).inverse() * true_pose(kFrames - 1)).p;
+    CHECK(moved.normalized().dot(truth.normalized()) > 0.9995);
+    if (wheels) CHECK(moved.norm() == Approx(truth.norm()).epsilon(0.03));
+  }
+}
+
+TEST_CASE("bad pictures are survived and called by name") {
+  Run run(true);
+  const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1), white = black + 255;
+  for (int i = 0; i < kFrames; ++i) {
+    CameraFrame frame = drive()[static_cast<size_t>(i)];
+    if (i == 10) frame.left = black;
+    if (i == 14) frame.left = white;
+    if (i == 18) frame.left = cv::Mat::zeros(20, 20, CV_8UC1);
+    if (i == 22) frame.left = cv::Mat();
+    if (i == 26) frame.right = cv::Mat();
+    if (i >= 30 && i < 33) {  // a lorry covers half the view
+      frame.left = frame.left.clone();
+      frame.left.colRange(0, kLens.width / 2).setTo(90);
+    }
+    const TrackedFrame& out = run.tracker.process(frame);
+    if (i == 10) CHECK(out.reason == "the picture is dark");
+    if (i == 14) CHECK(out.reason == "the picture is blank");
+    if (i == 10 || i == 14 || i == 18 || i == 22) CHECK(out.odometry.validity == Validity::kCoasting);
+    if (i == 11 || i == 15 || i == 19 || i == 23) CHECK(out.odometry.validity == Validity::kValid);
+  }
+  const Vector6d error = local(run.tracker.last().odometry.T_frame_vehicle, true_pose(kFrames - 1));
+  CHECK(error.head<3>().norm() < 0.02 * 0.8 * kFrames);
+  CHECK(run.tracker.last().reset_counter == 0);
+}
+
+TEST_CASE("darkness ends in lost within half a second, and a restart takes the pose given") {
+  Run run(true);
+  const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1);
+  for (int i = 0; i < 20; ++i) {
+    CameraFrame frame = drive()[static_cast<size_t>(i)];
+    if (i >= 8) frame.left = frame.right = black;
+    const TrackedFrame& out = run.tracker.process(frame);
+    if (i >= 13) {
+      CHECK(out.state == TrackState::kLost);
+      CHECK(out.odometry.validity == Validity::kInvalid);
+    }
+  }
+  run.tracker.restart(true_pose(20), 0.01 * Matrix6d::Identity());
+  for (int i = 20; i < kFrames; ++i)
+    CHECK(run.tracker.process(drive()[static_cast<size_t>(i)]).state == TrackState::kGood);
+  CHECK(run.tracker.last().reset_counter > 0);
+  const Vector6d error = local(run.tracker.last().odometry.T_frame_vehicle, true_pose(kFrames - 1));
+  CHECK(error.head<3>().norm() < 0.3);
+  CHECK(run.tracker.last().odometry.cov_pose(2, 2) > 0.01);  // what the restart's own pose was worth stays in it
+}
+
+TEST_CASE("standing still adds no drift") {
+  Run run(true);
+  const test::Street street(3);
+  for (int i = 0; i < 3; ++i) (void)run.tracker.process(drive()[static_cast<size_t>(i)]);
+  const SE3 before = run.tracker.last().odometry.T_frame_vehicle;
+  for (int i = 0; i < 40; ++i) {
+    const auto seed = static_cast<unsigned>(1000 + i);
+    CameraFrame frame{300'000 + 100'000 * (i + 1), street.picture(true_pose(2), kLens, 2.0, seed), {}};
+    frame.right = street.picture(true_pose(2) * rig(true).T_right_left.inverse(), kLens, 2.0, seed + 500);
+    (void)run.tracker.process(frame);
+  }
+  CHECK((run.tracker.last().odometry.T_frame_vehicle.p - before.p).norm() < 0.03);
+  CHECK(run.tracker.last().num_keyframes <= 4);
+}
+
+/// All poses, covariances and inliers of a run, as bytes.
+std::vector<unsigned char> bytes_of_run(bool stereo, bool spoil = false) {
+  Run run(stereo);
+  std::vector<unsigned char> bytes;
+  for (const CameraFrame& original : drive()) {
+    CameraFrame frame = original;
+    if (spoil && frame.t_us == 1'000'000) {
+      frame.left = frame.left.clone();
+      frame.left.at<uint8_t>(80, 240) ^= 0x40U;
+    }
+    const TrackedFrame& out = run.tracker.process(frame);
+    std::array<double, 43> row{};
+    std::copy_n(out.odometry.T_frame_vehicle.p.data(), 3, row.begin());
+    std::copy_n(out.odometry.T_frame_vehicle.q.coeffs().data(), 4, row.begin() + 3);
+    std::copy_n(out.odometry.cov_pose.data(), 36, row.begin() + 7);
+    const auto* first = reinterpret_cast<const unsigned char*>(row.data());
+    bytes.insert(bytes.end(), first, first + sizeof row);
+  }
+  return bytes;
+}
+
+TEST_CASE("two runs give the same bytes") {
+  for (const bool stereo : {false, true}) CHECK(bytes_of_run(stereo) == bytes_of_run(stereo));
+  CHECK(bytes_of_run(true) != bytes_of_run(true, true));  // teeth: one pixel differs
+}
+
+TEST_CASE("an older frame is refused") {
+  Run run(true);
+  (void)run.tracker.process(drive()[1]);
+  (void)run.tracker.process(drive()[2]);
+  const auto p = run.tracker.last().odometry.T_frame_vehicle.p;
+  CHECK(run.tracker.process(drive()[0]).odometry.T_frame_vehicle.p == p);
+  CHECK(run.tracker.last().odometry.t_us == drive()[2].t_us);
+}
+
+}  // namespace
+}  // namespace roadfix
