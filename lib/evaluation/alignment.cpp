@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "geometry/euler.h"
 #include "geometry/so3.h"
 
 namespace roadfix {
@@ -72,17 +73,28 @@ const char* name_of(Alignment alignment) {
       return "se3";
     case Alignment::kSim3:
       return "sim3";
+    case Alignment::kTied:
+      return "tied";
   }
   return "none";
 }
 
 std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment) {
   if (alignment == Alignment::kNone) return Similarity{};
-  if (pairs.size() < 3) return std::nullopt;
+  if (pairs.size() < 3 || alignment == Alignment::kTied) return std::nullopt;
   const Moments m = moments(pairs);
   if (!(m.variance_estimate > 0.0)) return std::nullopt;
   if (alignment == Alignment::kYaw) return align_yaw(m);
   return align_umeyama(m, alignment == Alignment::kSim3);
+}
+
+Similarity tie(const PosePair& pair) {
+  const SE3& estimate = pair.estimate.T_frame_vehicle;
+  const SE3& reference = pair.reference.T_frame_vehicle;
+  Similarity S;
+  S.T.q = exp_q(Eigen::Vector3d(0.0, 0.0, yaw_of(reference.q) - yaw_of(estimate.q)));
+  S.T.p = reference.p - S.T.q * estimate.p;
+  return S;
 }
 
 Odometry transformed(const Similarity& S, const Odometry& pose) {

@@ -15,6 +15,7 @@ enum class Alignment {
   kYaw,   ///< yaw and translation: what gravity cannot fix
   kSe3,   ///< rotation and translation
   kSim3,  ///< rotation, translation and scale: monocular vision
+  kTied,  ///< yaw and position taken over from the reference once: what an odometry is worth from then on
 };
 
 const char* name_of(Alignment alignment);
@@ -28,7 +29,11 @@ struct Similarity {
 /// The similarity of the given kind that brings the estimates' positions closest to the references' in the
 /// least-squares sense (Umeyama, PAMI 13, 1991; yaw alone: the same problem restricted to turns about z). Nothing where
 /// the positions do not determine it (fewer than three, or all on a line for SE3 and Sim3, all in a point for yaw).
+/// kTied is not of that kind: see tie().
 std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment alignment);
+
+/// The similarity of kTied: the estimate's yaw and position become the reference's at this pair. Needs attitude.
+Similarity tie(const PosePair& pair);
 
 Odometry transformed(const Similarity& S, const Odometry& pose);
 

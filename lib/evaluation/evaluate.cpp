@@ -99,6 +99,25 @@ Alignment default_alignment(const EstimateInput& estimate) {
   return estimate.local_frame ? Alignment::kYaw : Alignment::kNone;
 }
 
+/// The pair at which kTied takes the reference over: the last one at or before the time asked for, before the first
+/// outage otherwise; the first pair where there is none earlier.
+const PosePair& tie_pair(const std::vector<PosePair>& pairs, const DriveFacts& facts,
+                         const EvaluationOptions& options) {
+  int64_t tie_us = INT64_MAX;
+  if (!facts.outages.empty()) tie_us = facts.outages.front().first_withheld_us - 1;
+  tie_us = options.tie_us.value_or(tie_us);
+  const auto after =
+      std::find_if(pairs.begin(), pairs.end(), [&](const PosePair& p) { return p.reference.t_us > tie_us; });
+  return after == pairs.begin() || tie_us == INT64_MAX ? pairs.front() : *std::prev(after);
+}
+
+std::optional<Similarity> chosen_similarity(const ChannelReport& report, const DriveFacts& facts,
+                                            const ReferenceKind& kind, const EvaluationOptions& options) {
+  if (report.alignment != Alignment::kTied) return align(report.scored, report.alignment);
+  if (!kind.attitude || report.scored.empty()) return std::nullopt;
+  return tie(tie_pair(report.scored, facts, options));
+}
+
 void take_to_reference_point(EstimateInput& estimate) {
   if (!estimate.trajectory.has_attitude || estimate.lever_arm.isZero(0.0)) return;
   for (Odometry& pose : estimate.trajectory.poses) pose = at_lever_arm(pose, estimate.lever_arm);
@@ -129,7 +148,7 @@ void measure_pairs(ChannelReport& report, const ReferenceKind& kind, const Evalu
 
 void measure_outages(ChannelReport& report, const Reference& reference, const DriveFacts& facts,
                      const Trajectory& aligned, const ReferenceKind& kind) {
-  report.outages = outage_errors(aligned, reference.trajectory, facts.outages, kind);
+  report.outages = outage_errors(aligned, reference.trajectory, facts.outages, report.errors, kind);
   report.tse_m = transition_stability(report.errors, facts.outages);
   report.rct = reconvergence(report.errors, facts.outages);
 }
@@ -182,7 +201,7 @@ ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& fac
     const auto S = align(report.scored, alignment);
     if (S && !report.scored.empty()) report.ate_by_alignment.push_back(aligned_ate(report.scored, alignment, *S));
   }
-  const auto S = align(report.scored, report.alignment);
+  const auto S = chosen_similarity(report, facts, kind, options);
   if (!S) {
     report.scored.clear();  // an alignment that the data does not determine: nothing is scored, and pairs says so
   } else {

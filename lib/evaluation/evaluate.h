@@ -39,6 +39,7 @@ struct EstimateInput {
 
 struct EvaluationOptions {
   std::optional<Alignment> alignment;  ///< none: by the estimate's frame (ENU: none; own: yaw; no scale: sim3)
+  std::optional<int64_t> tie_us;       ///< of kTied; none: the last pair before the first outage
   bool fit_delay = false;              ///< the reference's constant latency is fitted first, within +-2 s
   double turn_threshold = 3.0 * 3.14159265358979323846 / 180.0;  ///< rad/s, of MPA
   int rpe_stride = 100;                                          ///< samples, paper C

@@ -28,10 +28,42 @@ bool within(int64_t t_us, int64_t centre_us, double half_width_s) {
   return std::abs(seconds_between(centre_us, t_us)) <= half_width_s;
 }
 
+std::optional<double> transition_peak(const std::vector<PoseError>& errors, const Outage& outage) {
+  std::optional<double> peak;
+  for (const PoseError& e : errors) {
+    if (!within(e.t_us, outage.first_withheld_us, kTransition) && !within(e.t_us, outage.return_us, kTransition))
+      continue;
+    peak = std::max(peak.value_or(0.0), e.horizontal());
+  }
+  return peak;
+}
+
+std::optional<double> settling_time(const std::vector<PoseError>& errors, const Outage& outage) {
+  const auto settled = std::find_if(errors.begin(), errors.end(), [&](const PoseError& e) {
+    return e.t_us >= outage.return_us && e.horizontal() < kSettled;
+  });
+  if (settled == errors.end()) return std::nullopt;
+  return seconds_between(outage.return_us, settled->t_us);
+}
+
+OutageError error_at_end(const PosePair& end, const Outage& outage, const Trajectory& reference,
+                         const ReferenceKind& kind) {
+  const PoseError error = pose_error(end, kind);
+  OutageError o;
+  o.outage = outage;
+  o.duration_s = seconds_between(outage.first_withheld_us, outage.last_withheld_us);
+  o.distance_m = path_between(reference, outage.first_withheld_us, outage.last_withheld_us);
+  o.horizontal_m = error.horizontal();
+  o.vertical_m = error.position_frame.z();
+  o.norm_m = error.norm();
+  if (kind.attitude) o.yaw_rad = error.angles.z();
+  return o;
+}
+
 }  // namespace
 
 OutageErrors outage_errors(const Trajectory& estimate, const Trajectory& reference, const std::vector<Outage>& outages,
-                           const ReferenceKind& kind) {
+                           const std::vector<PoseError>& errors, const ReferenceKind& kind) {
   OutageErrors out;
   std::vector<double> horizontal;
   std::vector<double> vertical;
@@ -43,15 +75,9 @@ OutageErrors outage_errors(const Trajectory& estimate, const Trajectory& referen
       ++out.missing;
       continue;
     }
-    const PoseError error = pose_error({*e, *r}, kind);
-    OutageError o;
-    o.outage = outage;
-    o.duration_s = seconds_between(outage.first_withheld_us, outage.last_withheld_us);
-    o.distance_m = path_between(reference, outage.first_withheld_us, outage.last_withheld_us);
-    o.horizontal_m = error.horizontal();
-    o.vertical_m = error.position_frame.z();
-    o.norm_m = error.norm();
-    if (kind.attitude) o.yaw_rad = error.angles.z();
+    OutageError o = error_at_end({*e, *r}, outage, reference, kind);
+    o.transition_peak_m = transition_peak(errors, outage);
+    o.settle_s = settling_time(errors, outage);
     out.each.push_back(o);
     horizontal.push_back(o.horizontal_m);
     vertical.push_back(o.vertical_m);

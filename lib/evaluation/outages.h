@@ -9,6 +9,10 @@
 
 namespace roadfix {
 
+/// What counts as near a loss or a return, s, and as settled after a return, m.
+inline constexpr double kTransition = 5.0;
+inline constexpr double kSettled = 0.3;
+
 struct OutageError {
   Outage outage;
   double duration_s = 0.0;    ///< from the first to the last withheld fix
@@ -17,6 +21,8 @@ struct OutageError {
   double vertical_m = 0.0;    ///< signed
   double norm_m = 0.0;
   std::optional<double> yaw_rad;
+  std::optional<double> transition_peak_m;  ///< largest horizontal error within kTransition of the loss or the return
+  std::optional<double> settle_s;  ///< from the return until the horizontal error is below kSettled; never: nothing
 };
 
 struct OutageErrors {
@@ -29,14 +35,15 @@ struct OutageErrors {
   double median_percent = 0.0;
 };
 
-/// Both trajectories in one frame and of one point. Outages in which the reference stands still have no percentage.
+/// Both trajectories in one frame and of one point; `errors` are those of the scored pairs. Outages in which the
+/// reference stands still have no percentage.
 OutageErrors outage_errors(const Trajectory& estimate, const Trajectory& reference, const std::vector<Outage>& outages,
-                           const ReferenceKind& kind);
+                           const std::vector<PoseError>& errors, const ReferenceKind& kind);
 
 /// TSE of paper C, (11): mean over the transitions of the largest error within half_width_s of each loss and each
 /// return. Nothing without a transition among the errors.
 std::optional<double> transition_stability(const std::vector<PoseError>& errors, const std::vector<Outage>& outages,
-                                           double half_width_s = 5.0);
+                                           double half_width_s = kTransition);
 
 struct Reconvergence {
   double mean_s = 0.0;       ///< RCT

@@ -21,6 +21,7 @@ struct Options {
   std::vector<std::string> channels;
   std::string align = "auto";
   bool fit_delay = false;
+  int64_t tie_us = 0;  ///< 0: not given
   double turn_degps = 3.0;
   std::filesystem::path out;
   std::filesystem::path json;
@@ -42,6 +43,8 @@ EvaluationOptions evaluation_options(const Options& options) {
   if (options.align == "yaw") out.alignment = Alignment::kYaw;
   if (options.align == "se3") out.alignment = Alignment::kSe3;
   if (options.align == "sim3") out.alignment = Alignment::kSim3;
+  if (options.align == "tied") out.alignment = Alignment::kTied;
+  if (options.tie_us != 0) out.tie_us = options.tie_us;
   return out;
 }
 
@@ -129,9 +132,13 @@ void add_evaluate_command(CLI::App& app) {
                    "the log with REFERENCE and CONFIG_DRIVE, where it is another one")
       ->check(CLI::ExistingFile);
   command->add_option("--channel", options->channels, "what to score; every POSE_* channel where none is named");
-  command->add_option("--align", options->align, "auto: none for ENU, yaw for an own frame, sim3 without scale")
-      ->check(CLI::IsMember({"auto", "none", "yaw", "se3", "sim3"}))
+  command
+      ->add_option(
+          "--align", options->align,
+          "auto: none for ENU, yaw for an own frame, sim3 without scale; tied: yaw and position of the reference once")
+      ->check(CLI::IsMember({"auto", "none", "yaw", "se3", "sim3", "tied"}))
       ->capture_default_str();
+  command->add_option("--tie-us", options->tie_us, "when tied; before the first outage where not given");
   command->add_flag("--fit-latency", options->fit_delay, "fit the reference's constant latency first, within 2 s");
   command->add_option("--turn-degps", options->turn_degps, "yaw rate that counts as a turn (MPA)")
       ->capture_default_str();

@@ -49,11 +49,14 @@ Json outages_json(const OutageErrors& outages) {
   for (const OutageError& o : outages.each) {
     Json row = {{"first_withheld_us", o.outage.first_withheld_us},
                 {"last_withheld_us", o.outage.last_withheld_us},
+                {"return_us", o.outage.return_us},
                 {"duration_s", o.duration_s},
                 {"distance_m", o.distance_m},
                 {"horizontal_m", o.horizontal_m},
                 {"vertical_m", o.vertical_m}};
     if (o.yaw_rad) row["yaw_deg"] = *o.yaw_rad / kDegree;
+    if (o.transition_peak_m) row["transition_peak_m"] = *o.transition_peak_m;
+    if (o.settle_s) row["settle_s"] = *o.settle_s;
     each.push_back(std::move(row));
   }
   return {{"count", outages.each.size()},

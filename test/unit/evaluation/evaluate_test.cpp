@@ -120,6 +120,25 @@ TEST_CASE("an estimate in its own frame is aligned by yaw and one without scale 
   CHECK(report.ate_by_alignment[0].rmse > 10.0);
 }
 
+TEST_CASE("a tied odometry starts from the reference and shows its own drift from there") {
+  const SE3 T{exp_q({0, 0, 1.0}), {50.0, 60.0, -7.0}};
+  auto estimate = estimate_of(changed(eight_trajectory(0.0, 200.0, 0.1), [&](Odometry& pose) {
+    pose.T_frame_vehicle = T * pose.T_frame_vehicle;
+    if (pose.t_us > 100 * kSecond) pose.T_frame_vehicle.p.z() += 0.01 * seconds_between(100 * kSecond, pose.t_us);
+  }));
+  DriveFacts facts = exact_facts();
+  facts.outages = {{100 * kSecond, 150 * kSecond, 151 * kSecond}};
+  EvaluationOptions options;
+  options.alignment = Alignment::kTied;
+  ChannelReport report = evaluate_channel(exact_reference(), facts, estimate, options);
+  CHECK(report.outages.each.at(0).vertical_m == Approx(0.5));
+  CHECK(report.outages.each.at(0).horizontal_m < 1e-9);
+  options.tie_us = 150 * kSecond;
+  report = evaluate_channel(exact_reference(), facts, estimate, options);
+  CHECK(report.outages.each.at(0).vertical_m == Approx(0.0).margin(1e-9));
+  CHECK(report.errors.front().position_frame.z() == Approx(-0.5));
+}
+
 TEST_CASE("a constant latency of the reference is found where it is asked for") {
   Reference reference = exact_reference(1.0);
   for (Odometry& pose : reference.trajectory.poses) pose.t_us += 430'000;

@@ -24,8 +24,13 @@ Trajectory drifting(double rate, double lag_s) {
 
 const Trajectory kReference = test::eight_trajectory(0.0, 250.0, 0.1);
 
+std::vector<PoseError> errors_of(const Trajectory& estimate) {
+  return pose_errors(associate(estimate, kReference, false), {});
+}
+
 TEST_CASE("the error of an outage is the one at its last withheld fix") {
-  const OutageErrors errors = outage_errors(drifting(0.1, 0.0), kReference, kOutages, {});
+  const OutageErrors errors =
+      outage_errors(drifting(0.1, 0.0), kReference, kOutages, errors_of(drifting(0.1, 0.0)), {});
   REQUIRE(errors.each.size() == 2);
   CHECK(errors.horizontal.rms == Approx(3.0));
   CHECK(errors.horizontal.max == Approx(3.0));
@@ -39,13 +44,20 @@ TEST_CASE("the error of an outage is the one at its last withheld fix") {
 TEST_CASE("an outage without an estimate at its end is missing and not zero") {
   Trajectory estimate = drifting(0.1, 0.0);
   std::erase_if(estimate.poses, [](const Odometry& pose) { return pose.t_us > 185 * kSecond; });
-  const OutageErrors errors = outage_errors(estimate, kReference, kOutages, {});
+  const OutageErrors errors = outage_errors(estimate, kReference, kOutages, errors_of(estimate), {});
   CHECK(errors.each.size() == 1);
   CHECK(errors.missing == 1);
 }
 
-std::vector<PoseError> errors_of(const Trajectory& estimate) {
-  return pose_errors(associate(estimate, kReference, false), {});
+TEST_CASE("the peak around a transition and the time to settle belong to their outage") {
+  const Trajectory estimate = drifting(0.1, 4.0);  // 0.1 m/s for 31 s and on for 4 s after the return, then in place
+  const OutageErrors errors = outage_errors(estimate, kReference, kOutages, errors_of(estimate), {});
+  for (const OutageError& o : errors.each) {
+    CHECK(o.transition_peak_m.value() == Approx(0.1 * 34.9).epsilon(1e-6));
+    CHECK(o.settle_s.value() == Approx(4.0));
+  }
+  const Trajectory stuck = drifting(0.1, 1000.0);
+  CHECK_FALSE(outage_errors(stuck, kReference, kOutages, errors_of(stuck), {}).each[1].settle_s);
 }
 
 TEST_CASE("TSE is the mean of the largest error around each loss and each return") {
