@@ -36,8 +36,10 @@ class StateWriter {
 
  private:
   void put_raw(const void* data, std::size_t size) {
-    const auto* begin = static_cast<const uint8_t*>(data);
-    bytes_.insert(bytes_.end(), begin, begin + size);
+    if (size == 0) return;
+    const std::size_t used = bytes_.size();
+    bytes_.resize(used + size);  // insert() draws a false overflow warning from GCC 12 where it is inlined
+    std::memcpy(bytes_.data() + used, data, size);
   }
 
   std::vector<uint8_t> bytes_;

@@ -1,0 +1,180 @@
+#include "wheel_odometry/handler.h"
+
+#include <cmath>
+#include <deque>
+#include <roadfix/imu_t.hpp>
+#include <roadfix/mag_t.hpp>
+#include <roadfix/pose_t.hpp>
+#include <roadfix/wheels_t.hpp>
+#include <variant>
+
+#include "bus/message.h"
+#include "bus/sample_codec.h"
+#include "config/config.h"
+#include "geometry/frames.h"
+
+namespace roadfix {
+namespace {
+
+enum Input { kImu = 0, kWheels = 1, kMag = 2 };
+using Sample = std::variant<ImuSample, WheelSample, MagSample>;
+
+Sample sample_of(const Message& message) {
+  switch (message.input) {
+    case kImu:
+      return imu_sample(decode<imu_t>(message.bytes));
+    case kWheels:
+      return wheel_sample(decode<wheels_t>(message.bytes));
+    default:
+      return mag_sample(decode<mag_t>(message.bytes));
+  }
+}
+
+int8_t state_code(WheelPhase phase) {
+  switch (phase) {
+    case WheelPhase::kWaiting:
+      return pose_t::STATE_WAITING;
+    case WheelPhase::kAligning:
+      return pose_t::STATE_ALIGNING;
+    case WheelPhase::kRunning:
+      return pose_t::STATE_RUNNING;
+    case WheelPhase::kWeak:
+      return pose_t::STATE_WEAK;
+    case WheelPhase::kLost:
+      break;
+  }
+  return pose_t::STATE_LOST;
+}
+
+class WheelOdometryStage final : public Stage {
+ public:
+  WheelOdometryStage(const Calibration& calibration, const WheelOdometryConfig& config)
+      : config_(config),
+        on_rear_axle_(calibration.body_origin == BodyOrigin::kRearAxle),
+        period_us_(static_cast<int64_t>(std::llround(config.publish_period * 1e6))),
+        odometry_({wheel_sensors(calibration), config.odometry}) {
+    spec_.name = "wheel_odometry";
+    spec_.inputs = {{"IMU", "imu_t", 0, 0}, {"WHEELS", "wheels_t", 50'000, 0}, {"MAG", "mag_t", 50'000, 0}};
+    spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
+    spec_.outputs = {{"POSE_WHEEL", "pose_t"}};
+  }
+
+  [[nodiscard]] const StageSpec& spec() const override { return spec_; }
+
+  void apply(const Message& message) override {
+    while (!ahead_.empty() && ahead_.front().utime <= message.utime) ahead_.pop_front();
+    add(odometry_, sample_of(message));
+  }
+
+  void on_clock(const Message& message) override { ahead_.push_back({message.utime, sample_of(message)}); }
+
+  void publish(int64_t now_utime, Outputs& outputs) override {
+    const int64_t slot = period_us_ > 0 ? now_utime / period_us_ : now_utime;
+    if (slot == last_slot_) return;
+    last_slot_ = slot;
+    WheelOdometry now = odometry_;
+    for (const Ahead& a : ahead_) add(now, a.sample);
+    const WheelReport report = now.report();
+    pose_t pose{};
+    fill_pose(now.odometry(), pose);
+    pose.frame = pose_t::FRAME_LOCAL;
+    pose.origin = on_rear_axle_ ? pose_t::ORIGIN_REAR_AXLE : pose_t::ORIGIN_IMU;
+    pose.scale = pose_t::SCALE_METRIC;
+    pose.state = state_code(report.phase);
+    pose.reason = report.reason;
+    pose.reset_counter = report.reset_counter;
+    pose.reset_delta_q_wxyz[0] = 1.0;  // resets of this odometry lose the way, they do not move the pose
+    outputs.publish(0, pose);
+  }
+
+  void digest(Digest& digest) const override {
+    digest.add(odometry_.state().x);
+    digest.add(odometry_.state().P);
+  }
+
+  [[nodiscard]] std::vector<uint8_t> save() const override {
+    StateWriter writer;
+    writer.put(last_slot_);
+    odometry_.save(writer);
+    return writer.take();
+  }
+
+  void load(std::span<const uint8_t> state) override {
+    StateReader reader(state);
+    WheelOdometry loaded(odometry_.config());
+    const auto slot = reader.get<int64_t>();
+    loaded.load(reader);
+    reader.finish();
+    odometry_ = loaded;
+    last_slot_ = slot;
+    ahead_.clear();
+  }
+
+  [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+
+ private:
+  /// A clock sample that the horizon has not reached.
+  struct Ahead {
+    int64_t utime = 0;
+    Sample sample;
+  };
+
+  static void add(WheelOdometry& odometry, const Sample& sample) {
+    std::visit([&](const auto& s) { (void)odometry.add(s); }, sample);
+  }
+
+  WheelOdometryConfig config_;
+  bool on_rear_axle_;
+  int64_t period_us_;
+  StageSpec spec_;
+  WheelOdometry odometry_;  ///< at the horizon
+  std::deque<Ahead> ahead_;
+  int64_t last_slot_ = -1;
+};
+
+template <class T>
+void take(const std::optional<T>& from, T& to) {
+  if (from) to = *from;
+}
+
+/// Random walk that a Gauss-Markov process is over times short against its correlation.
+void take_walk(const std::optional<double>& sigma, const std::optional<double>& correlation_s, double& walk) {
+  if (sigma && correlation_s) walk = *sigma * std::sqrt(2.0 / *correlation_s);
+}
+
+}  // namespace
+
+WheelSensors wheel_sensors(const Calibration& calibration) {
+  WheelSensors s;
+  if (const auto& imu = calibration.sensors.imu) {
+    take(imu->gyro_noise, s.gyro_noise);
+    take(imu->accel_noise, s.accel_noise);
+    take(imu->gyro_bias_std, s.gyro_bias_std);
+    take(imu->accel_bias_std, s.accel_bias_std);
+    take(imu->scale_std, s.gyro_scale_std);
+    take_walk(imu->gyro_bias_std, imu->correlation, s.gyro_bias_walk);
+    take_walk(imu->accel_bias_std, imu->correlation, s.accel_bias_walk);
+  }
+  if (const auto& wheels = calibration.sensors.wheels) {
+    take(wheels->speed_scale_std, s.wheel_scale_std);
+    take(wheels->speed_noise, s.wheel_noise);
+    s.track_width = wheels->track_width;
+  }
+  if (const auto& mag = calibration.sensors.mag) {
+    take(mag->hard_iron, s.hard_iron_ut);
+    take(mag->soft_iron, s.soft_iron);
+  }
+  if (calibration.mounting && calibration.mounting->std_deg) s.mounting_std = kDegree * *calibration.mounting->std_deg;
+  return s;
+}
+
+std::unique_ptr<Stage> make_wheel_odometry(const Calibration& calibration, const WheelOdometryConfig& config) {
+  return std::make_unique<WheelOdometryStage>(calibration, config);
+}
+
+std::unique_ptr<Stage> make_wheel_odometry(const std::filesystem::path& vehicle_dir) {
+  return make_wheel_odometry(load_calibration(vehicle_dir),
+                             load_config_or_defaults<WheelOdometryConfig>(vehicle_dir / "wheel_odometry.yaml"));
+}
+
+}  // namespace roadfix
