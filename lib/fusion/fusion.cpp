@@ -29,13 +29,13 @@ Fusion::Fusion(const FusionConfig& config) : config_(config) {}
 ChannelSlots Fusion::slots(FusionChannel c) {
   switch (c) {
     case FusionChannel::kVo:
-      return {kVoClone, kVoScale, kVoDrift};
+      return {kVoClone, kVoScale, kVoDrift, std::nullopt};
     case FusionChannel::kWheel:
-      return {kWheelClone, kWheelScale, kWheelDrift};
+      return {kWheelClone, kWheelScale, std::nullopt, std::nullopt};
     case FusionChannel::kIns:
       break;
   }
-  return {kInsClone, std::nullopt, std::nullopt};
+  return {kInsClone, std::nullopt, std::nullopt, kInsVelocity};
 }
 
 double Fusion::timeout(FusionChannel c) const {
@@ -53,6 +53,7 @@ bool Fusion::alive(FusionChannel c) const {
 }
 
 void Fusion::set_gnss(int64_t t_us, bool present) {
+  if (gnss_ && !present) refuse_fix(comeback_);
   gnss_ = present;
   ::roadfix::set_gnss(ramp_, config_.adaptive, t_us, present);
 }
@@ -70,16 +71,17 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (!started_) start(s);
 
   const FusionEstimate before = now_;
+  const double dt = seconds_between(t_us_, s.odometry.t_us);
   advance(s.odometry.t_us);
   if (!good) {
-    follow_local(before);
+    follow_local(before, dt);
     memory(s.channel).last.reset();
     if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
     return done(FuseStatus::kBadQuality);
   }
   memory(s.channel).alive_us = report.last_us = t_us_;
   const double known = now_.P.block<2, 2>(kPos, kPos).trace();
-  const FuseStatus status = fuse(s, before, report);
+  const FuseStatus status = fuse(s, before, dt, report);
   if (s.channel == FusionChannel::kVo) update_tie(s);
   remember(s);
   reweigh(imm_);
@@ -88,14 +90,14 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   return done(status);
 }
 
-FuseStatus Fusion::fuse(const ChannelSample& s, const FusionEstimate& before, ChannelReport& report) {
+FuseStatus Fusion::fuse(const ChannelSample& s, const FusionEstimate& before, double dt, ChannelReport& report) {
   if (s.channel == FusionChannel::kIns && !placed_) {
-    follow_local(before);
+    follow_local(before, dt);
     place(s.odometry);
     return FuseStatus::kAccepted;
   }
   if (config_.scheme == FusionScheme::kLiteral) {
-    follow_local(before);
+    follow_local(before, dt);
     return fuse_literal(s, report);
   }
   move_height(s);
@@ -103,7 +105,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const FusionEstimate& before, Ch
   now_ = combine(imm_);
   fuse_rates(s);
   now_ = combine(imm_);
-  follow_local(before);
+  follow_local(before, dt);
   if (s.channel == FusionChannel::kIns) status = fuse_gain(s, report);
   return status;
 }
@@ -131,7 +133,7 @@ void Fusion::start(const ChannelSample& s) {
   set_independent(e, kVoScale, 0.0, config_.vo_scale_std);
   set_independent(e, kVoDrift, 0.0, config_.vo_drift_std);
   set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
-  set_independent(e, kWheelDrift, 0.0, config_.wheel_drift_std);
+  for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::sqrt(s.odometry.cov_velocity(0, 0)));
   for (const int clone : {int{kInsClone}, int{kVoClone}, int{kWheelClone}}) clone_pose(e, clone);
   for (Mode& mode : imm_.modes) mode.estimate = e;
   now_ = e;

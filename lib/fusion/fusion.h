@@ -59,6 +59,7 @@ struct FusionReport {
   std::string reason;
   int reset_counter = 0;
   Planar last_jump = Planar::Zero();
+  double last_jump_height = 0.0;  ///< m
 };
 
 class Fusion {
@@ -93,6 +94,7 @@ class Fusion {
     std::optional<Odometry> last;  ///< at the clone
     int reset_counter = 0;
     bool shares_imu = false;
+    Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();  ///< m2/s2, in enu, of the INS at its last sample
     double yaw_rate_variance = 0.0;  ///< rad2/s, of its motion lately: which of two that share a gyro is better
     std::optional<int64_t> alive_us;
     ConsistencyCheck check;
@@ -111,19 +113,21 @@ class Fusion {
   void start(const ChannelSample& sample);
   void place(const Odometry& o);
   void advance(int64_t t_us);
-  FuseStatus fuse(const ChannelSample& sample, const FusionEstimate& before, ChannelReport& report);
+  FuseStatus fuse(const ChannelSample& sample, const FusionEstimate& before, double dt, ChannelReport& report);
   FuseStatus fuse_literal(const ChannelSample& sample, ChannelReport& report);
   FuseStatus fuse_motion(const ChannelSample& sample, ChannelReport& report);
   [[nodiscard]] Planar motion_of(const ChannelSample& sample, const Odometry& last) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
+  void follow_velocity_error(const Odometry& ins);
   void fuse_rates(const ChannelSample& sample);
   FuseStatus fuse_gain(const ChannelSample& sample, ChannelReport& report);
   void apply_gain(const Measurement<3>& gain);
+  void distrust_velocity(const Planar& difference);
   void give_way(const Planar& difference);
   void remember(const ChannelSample& sample);
   void move_height(const ChannelSample& sample);
   void gain_height(const Odometry& o);
-  void follow_local(const FusionEstimate& before);
+  void follow_local(const FusionEstimate& before, double dt);
   void update_tie(const ChannelSample& sample);
   void ask_restart(const char* reason);
   void weigh(FusionChannel c, double information);
@@ -151,6 +155,9 @@ class Fusion {
   std::optional<int64_t> restart_us_;
   std::optional<int64_t> refused_since_us_;
   std::optional<int64_t> last_fix_us_;
+  bool ins_corrected_ = false;  ///< the INS used a fix since its last sample
+  int passes_needed_ = 0;       ///< fixes that must pass the gate before absolute poses are used again
+  double distrust_ = 0.0;       ///< m/s, of the INS velocity after a contradiction
   std::optional<int64_t> last_tie_us_;
   bool vo_scale_open_ = true;  ///< a non-metric vision's scale has no value yet
   ReturnState comeback_;

@@ -33,13 +33,13 @@ struct FusionConfig {
   double straight_duration = 10.0;  ///< s, mean duration of the mode
   double turn_duration = 4.0;       ///< s
   double turn_sigma = 0.01;         ///< rad/s, of a yaw rate as it is measured
+  double speed_sigma = 0.05;        ///< m/s, white error of a speed, beside what the channel says of it
   MotionFloor ins_floor;
   MotionFloor vo_floor{0.01, 0.003, 3e-4};
   MotionFloor wheel_floor{0.01, 0.003, 5e-4};
   double vo_scale_std = 0.03;  ///< before GNSS has shown it
   double vo_drift_std = 2e-4;  ///< rad/s
   double wheel_scale_std = 0.01;
-  double wheel_drift_std = 3e-4;  ///< rad/s
   double least_gain = 0.1;        ///< share of variance that an absolute pose must take away to be used
   double gate = 16.3;             ///< squared Mahalanobis distance, 99.9 % of 3 degrees of freedom
   double refusal_timeout = 10.0;  ///< s of refused absolute poses after which they are right
@@ -61,13 +61,13 @@ void visit(FusionConfig& c, Visitor& v) {
   v.number("straight_duration_s", c.straight_duration, 0.01, 1e4);
   v.number("turn_duration_s", c.turn_duration, 0.01, 1e4);
   v.number("turn_sigma_radps", c.turn_sigma, 1e-5, 1.0);
+  v.number("speed_sigma_mps", c.speed_sigma, 1e-4, 10.0);
   v.group("ins_floor", c.ins_floor);
   v.group("vo_floor", c.vo_floor);
   v.group("wheel_floor", c.wheel_floor);
   v.number("vo_scale_std", c.vo_scale_std, 0.0, 1.0);
   v.number("vo_drift_std_radps", c.vo_drift_std, 0.0, 1.0);
   v.number("wheel_scale_std", c.wheel_scale_std, 0.0, 1.0);
-  v.number("wheel_drift_std_radps", c.wheel_drift_std, 0.0, 1.0);
   v.number("least_gain", c.least_gain, 0.001, 0.999);
   v.number("gate", c.gate, 0.1, 1e9);
   v.number("refusal_timeout_s", c.refusal_timeout, 0.0, 1e6);

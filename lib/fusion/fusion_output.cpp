@@ -54,7 +54,8 @@ Odometry Fusion::fused() const {
   Planar pose = now_.x.segment<3>(kPos) + comeback_.residual;
   pose.z() = wrap_angle(pose.z());
   const Eigen::Matrix3d P = now_.P.block<3, 3>(kPos, kPos) + comeback_.residual * comeback_.residual.transpose();
-  Odometry o = full_pose(t_us_, pose, P, height_, height_variance_, attitude_);
+  Odometry o = full_pose(t_us_, pose, P, height_ + comeback_.height,
+                         height_variance_ + comeback_.height * comeback_.height, attitude_);
   o.velocity.x() = now_.x(kSpeed);
   o.cov_velocity.row(0).setZero();
   o.cov_velocity.col(0).setZero();
@@ -73,9 +74,18 @@ Odometry Fusion::local() const {
   return o;
 }
 
-/// The local pose goes on by the motion from the last posterior to what is known before any absolute pose is used.
-void Fusion::follow_local(const FusionEstimate& before) {
-  const Planar motion = motion_between(before.x.segment<3>(kPos), now_.x.segment<3>(kPos));
+/// The local pose goes on by the motion from the last posterior to what is known before any absolute pose is used. What
+/// of it the speed cannot explain is hindsight (a turn shows which way the drift went): the local pose leaves it out,
+/// the published one makes it up at its bounded rate.
+void Fusion::follow_local(const FusionEstimate& before, double dt) {
+  Planar motion = motion_between(before.x.segment<3>(kPos), now_.x.segment<3>(kPos));
+  const Planar driven(0.5 * (before.x(kSpeed) + now_.x(kSpeed)) * dt, 0.0, motion.z());
+  const Planar hindsight = motion - driven;
+  if (hindsight.norm() > config_.jump_tolerance) {
+    const Eigen::Vector2d shift = Eigen::Rotation2Dd(before.x(kYaw)) * hindsight.head<2>();
+    take_fix(comeback_, config_.comeback, {shift.x(), shift.y(), 0.0}, false);
+    motion = driven;
+  }
   const Eigen::Matrix3d R = motion_covariance(before.x.segment<3>(kPos), before.P.block<3, 3>(kPos, kPos), motion,
                                               now_.P.block<3, 3>(kPos, kPos), Eigen::Vector3d::Constant(1e-5));
   const Eigen::Matrix3d carry = after_motion_by_start(local_, motion);
@@ -104,6 +114,7 @@ void Fusion::move_height(const ChannelSample& s) {
 
 void Fusion::gain_height(const Odometry& o) {
   if (o.cov_pose(2, 2) >= (1.0 - config_.least_gain) * height_variance_) return;
+  take_height(comeback_, config_.comeback, o.T_frame_vehicle.p.z() - height_);
   height_ = o.T_frame_vehicle.p.z();
   height_variance_ = o.cov_pose(2, 2);
 }
@@ -112,6 +123,7 @@ FusionReport Fusion::report() const {
   FusionReport r;
   r.reset_counter = comeback_.resets;
   r.last_jump = comeback_.last_jump;
+  r.last_jump_height = comeback_.last_jump_height;
   if (!started_) {
     r.reason = "waits for a pose";
     return r;
@@ -188,8 +200,10 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
         self.ramp_.level_at_change, self.agreement_.agrees, self.agreement_.count);
   visit_odometry(self.attitude_, visit);
   FrameTie::visit_members(self.tie_, visit);
-  visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.last_tie_us_, self.vo_scale_open_);
-  visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump);
+  visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.ins_corrected_, self.passes_needed_,
+        self.distrust_, self.last_tie_us_, self.vo_scale_open_);
+  visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
+        self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_, self.local_height_, self.local_covariance_, self.local_height_variance_);
 }
 
@@ -197,7 +211,8 @@ void Fusion::save(StateWriter& writer) const {
   const auto put = [&](const auto&... members) { (write(writer, members), ...); };
   visit_members(*this, put);
   for (const Memory& m : memories_) {
-    put(m.reset_counter, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio, m.last.has_value());
+    put(m.reset_counter, m.velocity_covariance, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio,
+        m.last.has_value());
     if (m.last) visit_odometry(*m.last, put);
   }
   put(restart_.has_value());
@@ -212,7 +227,7 @@ void Fusion::load(StateReader& reader) {
   visit_members(*this, get);
   for (Memory& m : memories_) {
     bool has = false;
-    get(m.reset_counter, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio, has);
+    get(m.reset_counter, m.velocity_covariance, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio, has);
     m.last.reset();
     if (has) visit_odometry(m.last.emplace(), get);
   }

@@ -16,11 +16,11 @@ enum Index {
   kInsClone = 6,  ///< east, north, yaw at the last use of each channel (stochastic cloning)
   kVoClone = 9,
   kWheelClone = 12,
-  kVoScale = 15,     ///< log of measured over true length
-  kVoDrift = 16,     ///< rad/s, measured yaw rate less true
-  kWheelScale = 17,  ///< likewise
-  kWheelDrift = 18,
-  kSize = 19
+  kVoScale = 15,      ///< log of measured over true length
+  kVoDrift = 16,      ///< rad/s, measured yaw rate less true
+  kWheelScale = 17,   ///< likewise
+  kInsVelocity = 18,  ///< m/s, east and north: error of the INS velocity, which lasts through an outage
+  kSize = 20
 };
 
 inline constexpr int kYaws[] = {kYaw, kInsClone + 2, kVoClone + 2, kWheelClone + 2};

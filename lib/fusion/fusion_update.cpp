@@ -16,6 +16,9 @@ constexpr double kWeightSmoothing = 0.05;  ///< share of the newest use in a cha
 constexpr double kScaleBase = 1.0;         ///< m, motion from which a non-metric scale is taken
 constexpr double kFirstScaleSigma = 0.2;   ///< of that scale
 constexpr double kFixSpacing = 0.05;       ///< s: corrections closer than this belong to one fix
+constexpr double kCorrected = 0.01;        ///< share of a variance that an INS loses by a fix at least
+constexpr double kDistrustTime = 5.0;      ///< s, in which distrust of the INS velocity fades
+constexpr double kWrongFor = 1.0;          ///< s: a position that is wrong by d may come with a speed wrong by d / this
 constexpr double kTieSpacing = 1.0;  ///< s: the tie's comparisons are that far apart, for their errors' correlation
 constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 
@@ -23,6 +26,12 @@ constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 double level_turn(const Odometry& o) {
   const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
   return (o.angular_rate.y() * std::sin(a.roll) + o.angular_rate.z() * std::cos(a.roll)) / std::cos(a.pitch);
+}
+
+/// The INS has used a fix since its last sample: something of its pose became surer.
+bool corrected(const Odometry& last, const Odometry& now) {
+  const Eigen::Vector3d before = planar_covariance(last).diagonal(), after = planar_covariance(now).diagonal();
+  return (after.array() < (1.0 - kCorrected) * before.array()).any();
 }
 
 }  // namespace
@@ -48,7 +57,7 @@ Planar Fusion::motion_of(const ChannelSample& s, const Odometry& last) const {
   const Planar felt = motion_by_velocity(last, s.odometry);
   const double tolerance = config_.jump_tolerance;
   const bool jumped = (motion - felt).head<2>().norm() > tolerance || std::abs(motion.z() - felt.z()) > 0.2 * tolerance;
-  return jumped ? felt : motion;
+  return ins_corrected_ || jumped ? felt : motion;
 }
 
 /// A vision without scale takes the first one from what the others say of the same motion.
@@ -70,6 +79,26 @@ bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const
          memory(other).yaw_rate_variance < variance;
 }
 
+/// The INS velocity's error lasts while nothing corrects it: its variance grows as the INS says; where the INS says
+/// that it shrank, the INS has corrected it, and what was known of it is void.
+void Fusion::follow_velocity_error(const Odometry& ins) {
+  const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
+  const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
+  Eigen::Matrix2d& last = memory(FusionChannel::kIns).velocity_covariance;
+  const bool redone = P.trace() < (1.0 - config_.least_gain) * last.trace();
+  distrust_ *= std::exp(-seconds_between(memory(FusionChannel::kIns).last->t_us, t_us_) / kDistrustTime);
+  for (Mode& mode : imm_.modes) {
+    for (int i = 0; i < 2; ++i) {
+      if (redone) {
+        set_independent(mode.estimate, kInsVelocity + i, 0.0, std::max(distrust_, std::sqrt(P(i, i))));
+      } else {
+        mode.estimate.P(kInsVelocity + i, kInsVelocity + i) += std::max(0.0, P(i, i) - last(i, i));
+      }
+    }
+  }
+  last = P;
+}
+
 FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
   Memory& m = memory(s.channel);
   m.shares_imu = s.shares_imu;
@@ -89,13 +118,23 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
   if (!m.last) return FuseStatus::kNotReady;
   const double dt = seconds_between(m.last->t_us, t_us_);
   if (dt <= 0.0) return FuseStatus::kNotReady;
+  if (dt > timeout(s.channel)) {
+    m.last.reset();
+    return FuseStatus::kNotReady;
+  }
+  if (s.channel == FusionChannel::kIns) ins_corrected_ = corrected(*m.last, s.odometry);
   const Planar motion = motion_of(s, *m.last);
   if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
 
+  if (s.channel == FusionChannel::kIns) follow_velocity_error(s.odometry);
   const MotionFloor& f = floor(s.channel);
   const double sigma = f.position * std::sqrt(dt) + f.share * motion.head<2>().norm();
   Eigen::Matrix3d R = motion_covariance(planar_pose(*m.last), planar_covariance(*m.last), motion,
                                         planar_covariance(s.odometry), {sigma, sigma, f.yaw * std::sqrt(dt)});
+  if (s.channel == FusionChannel::kIns) {  // its positions' growth is that of the velocity's error, a state here
+    const double yaw = R(2, 2);
+    R = Eigen::Vector3d(sigma * sigma, sigma * sigma, yaw).asDiagonal();
+  }
   m.yaw_rate_variance = R(2, 2) / dt;
   if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
     R.row(2).setZero();
@@ -124,14 +163,14 @@ void Fusion::fuse_rates(const ChannelSample& s) {
   const double turn = level_turn(s.odometry);
   update<1>([&](const Vector& x) { return absolute_component(x, kTurn, turn, config_.turn_sigma); });
   if (!s.metric) return;
-  const double variance = s.odometry.cov_velocity(0, 0);
-  const std::optional<Measurement<1>> gain =
-      gained_component(now_, kSpeed, s.odometry.velocity.x(), variance, config_.least_gain);
-  if (!gain) return;
-  const double mean = now_.x(kSpeed);
+  const double lasting = s.channel == FusionChannel::kIns ? 0.0 : s.odometry.cov_velocity(0, 0);
+  const double variance = lasting + config_.speed_sigma * config_.speed_sigma;
   update<1>([&](const Vector& x) {
-    Measurement<1> m = *gain;
-    m.innovation(0) += mean - x(kSpeed);
+    Measurement<1> m = absolute_component(x, kSpeed, s.odometry.velocity.x(), std::sqrt(variance));
+    if (s.channel != FusionChannel::kIns) return m;
+    const Eigen::RowVector2d along(std::cos(x(kYaw)), std::sin(x(kYaw)));
+    m.H.block<1, 2>(0, kInsVelocity) = along;
+    m.innovation(0) -= along.dot(x.segment<2>(kInsVelocity));
     return m;
   });
 }
@@ -149,12 +188,17 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, ChannelReport& report) {
   FuseStatus status = FuseStatus::kAccepted;
   if (report.nis > config_.gate) {
     refuse_fix(comeback_);
+    distrust_velocity(plain.innovation);
+    passes_needed_ = config_.comeback.fixes;
     if (!refused_since_us_) refused_since_us_ = t_us_;
     if (seconds_between(*refused_since_us_, t_us_) < config_.refusal_timeout) return FuseStatus::kGated;
     give_way(plain.innovation);
     gain = gained_pose(now_, pose, P_pose, config_.least_gain);
     status = FuseStatus::kReset;
+    passes_needed_ = 0;
   }
+  if (passes_needed_ > 0 && ins_corrected_) --passes_needed_;
+  if (passes_needed_ > 0) return FuseStatus::kGated;
   refused_since_us_.reset();
   if (gain) apply_gain(*gain);
   return status;
@@ -170,9 +214,20 @@ void Fusion::apply_gain(const Measurement<3>& gain) {
   now_ = combine(imm_);
   const Planar correction = difference(now_.x, before.x).segment<3>(kPos);
   const bool same_fix = last_fix_us_ && seconds_between(*last_fix_us_, t_us_) < kFixSpacing;
-  if (same_fix) --comeback_.fixes_in_row;
-  take_fix(comeback_, config_.comeback, correction);
+  take_fix(comeback_, config_.comeback, correction, gnss_ && ins_corrected_ && !same_fix);
   last_fix_us_ = t_us_;
+}
+
+/// An INS that was taken to a wrong place may have got a wrong speed with it; and may pass by the right place on its
+/// way back, so that trust returns slowly.
+void Fusion::distrust_velocity(const Planar& difference) {
+  distrust_ = std::max(distrust_, difference.head<2>().norm() / kWrongFor);
+  for (Mode& mode : imm_.modes) {
+    for (int i = 0; i < 2; ++i) {
+      double& variance = mode.estimate.P(kInsVelocity + i, kInsVelocity + i);
+      variance = std::max(variance, distrust_ * distrust_);
+    }
+  }
 }
 
 /// The absolute pose contradicts for so long that the fusion must be wrong: its uncertainty grows to the contradiction.

@@ -14,6 +14,13 @@ double length_factor(const Vector& x, const ChannelSlots& slots) {
   return slots.scale ? std::exp(x(*slots.scale)) : 1.0;
 }
 
+/// Where the channel believes the vehicle to be, its velocity error since the clone included.
+Planar seen(const Vector& x, const ChannelSlots& slots, double dt) {
+  Planar now = x.segment<3>(kPos);
+  if (slots.velocity) now.head<2>() += dt * x.segment<2>(*slots.velocity);
+  return now;
+}
+
 /// z and R that bring a prior of variance p to value `d` away, variance p_new: gain 1 - p_new / p (F.13).
 struct Equivalent {
   double innovation = 0.0;
@@ -41,7 +48,7 @@ Measurement<1> absolute_component(const Vector& x, int index, double value, doub
 }
 
 Planar predicted_motion(const Vector& x, const ChannelSlots& slots, double dt) {
-  Planar m = motion_between(x.segment<3>(slots.clone), x.segment<3>(kPos));
+  Planar m = motion_between(x.segment<3>(slots.clone), seen(x, slots, dt));
   m.head<2>() *= length_factor(x, slots);
   if (slots.drift) m.z() = wrap_angle(m.z() + x(*slots.drift) * dt);
   return m;
@@ -49,7 +56,7 @@ Planar predicted_motion(const Vector& x, const ChannelSlots& slots, double dt) {
 
 Measurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const Planar& motion, double dt,
                                const Eigen::Matrix3d& R) {
-  const Planar clone = x.segment<3>(slots.clone), now = x.segment<3>(kPos);
+  const Planar clone = x.segment<3>(slots.clone), now = seen(x, slots, dt);
   const Planar predicted = predicted_motion(x, slots, dt);
   Measurement<3> m;
   m.H.middleCols<3>(kPos) = motion_by_end(clone);
@@ -57,6 +64,7 @@ Measurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const
   m.H.topRows<2>() *= length_factor(x, slots);
   if (slots.scale) m.H.block<2, 1>(0, *slots.scale) = predicted.head<2>();
   if (slots.drift) m.H(2, *slots.drift) = dt;
+  if (slots.velocity) m.H.block<2, 2>(0, *slots.velocity) = dt * m.H.block<2, 2>(0, kPos);
   m.innovation = motion - predicted;
   m.innovation.z() = wrap_angle(m.innovation.z());
   m.R = R;

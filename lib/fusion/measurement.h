@@ -20,11 +20,12 @@ struct Measurement {
   Eigen::Matrix<double, M, M> R = Eigen::Matrix<double, M, M>::Zero();
 };
 
-/// Where a relative channel keeps its clone and its two parameters.
+/// Where a relative channel keeps its clone and its parameters.
 struct ChannelSlots {
   int clone = fusion::kInsClone;
   std::optional<int> scale;
   std::optional<int> drift;
+  std::optional<int> velocity;  ///< east and north: a lasting error of the motion
 };
 
 /// Paper C (5), (6): the pose as a pseudo-measurement of position and yaw.

@@ -90,8 +90,13 @@ void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double d
   G(kTurn) = 1.0;
   e.P.topLeftCorner<kBase, kBase>() += sigma * sigma * G * G.transpose();
 
+  // A slip that lasts for a while, as the white noise that displaces as much.
+  const double slip = noise.slip + noise.slip_arm * std::abs(e.x(kTurn));
+  const Eigen::Vector2d across(-along.y(), along.x());
+  e.P.block<2, 2>(kPos, kPos) += 2.0 * noise.slip_time * slip * slip * dt * across * across.transpose();
+
   for (const int i : {int{kVoScale}, int{kWheelScale}}) e.P(i, i) += noise.scale_walk * noise.scale_walk * dt;
-  for (const int i : {int{kVoDrift}, int{kWheelDrift}}) e.P(i, i) += noise.drift_walk * noise.drift_walk * dt;
+  e.P(kVoDrift, kVoDrift) += noise.drift_walk * noise.drift_walk * dt;
   e.x = moved(e.x, kind, dt);
 }
 

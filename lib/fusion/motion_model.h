@@ -14,6 +14,9 @@ struct MotionNoise {
   double jerk = 2.0;            ///< m/s3 per sqrt(Hz): acceleration as a random walk
   double straight_turn = 0.03;  ///< rad/s, yaw rate of a car that drives straight, each step anew
   double turn_change = 0.14;    ///< rad/s, change of a turning car's yaw rate per step
+  double slip = 0.03;           ///< m/s, sideways, of a car that drives straight
+  double slip_arm = 1.5;        ///< m: sideways speed per yaw rate, of an origin that is not at the rear axle
+  double slip_time = 1.0;       ///< s, for which a slip lasts
   double scale_walk = 2e-5;     ///< per sqrt(s), of the odometries' scales
   double drift_walk = 2e-6;     ///< rad/s per sqrt(s), of their yaw drifts
 };
@@ -33,6 +36,9 @@ void visit(MotionNoise& c, Visitor& v) {
   v.number("jerk_mps3_per_rthz", c.jerk, 0.0, 100.0);
   v.number("straight_turn_radps", c.straight_turn, 1e-4, 1.0);
   v.number("turn_change_radps", c.turn_change, 1e-4, 10.0);
+  v.number("slip_mps", c.slip, 0.0, 100.0);
+  v.number("slip_arm_m", c.slip_arm, 0.0, 100.0);
+  v.number("slip_time_s", c.slip_time, 0.0, 100.0);
   v.number("scale_walk_per_rts", c.scale_walk, 0.0, 0.1);
   v.number("drift_walk_radps_per_rts", c.drift_walk, 0.0, 0.1);
 }

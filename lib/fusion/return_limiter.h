@@ -13,7 +13,7 @@ struct ReturnConfig {
   double turn_rate = 0.05;  ///< rad/s
   double jump = 1.5;        ///< m: residuals above it wait for the fixes and then jump
   int fixes = 3;            ///< in a row
-  double ignored = 0.02;    ///< m: corrections below it are passed on as they are
+  double ignored = 0.15;    ///< m: corrections below it are passed on as they are
 };
 
 template <class Visitor>
@@ -27,14 +27,18 @@ void visit(ReturnConfig& c, Visitor& v) {
 
 struct ReturnState {
   Planar residual = Planar::Zero();  ///< published minus filtered
+  double height = 0.0;               ///< m, likewise
   int fixes_in_row = 0;
   int resets = 0;
   Planar last_jump = Planar::Zero();  ///< published new minus old
+  double last_jump_height = 0.0;      ///< m
 };
 
-/// The filter corrected its pose by `correction` (new minus old) with a fix that passed its gate.
-void take_fix(ReturnState& s, const ReturnConfig& config, const Planar& correction);
-/// A fix was refused.
+/// The filter corrected its pose by `correction` (new minus old); `counts`: by a new fix that passed its gate.
+void take_fix(ReturnState& s, const ReturnConfig& config, const Planar& correction, bool counts);
+/// The same of the height.
+void take_height(ReturnState& s, const ReturnConfig& config, double correction);
+/// A fix was refused, or none comes any more.
 void refuse_fix(ReturnState& s);
 /// Time passes: the residual shrinks.
 void let_return(ReturnState& s, const ReturnConfig& config, double dt_s);

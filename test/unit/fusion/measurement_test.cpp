@@ -18,14 +18,15 @@ namespace {
 using test::Draws;
 using test::random_estimate;
 
-const ChannelSlots kVision{kVoClone, kVoScale, kVoDrift};
+const ChannelSlots kVision{kVoClone, kVoScale, kVoDrift, std::nullopt};
+const ChannelSlots kInertial{kInsClone, std::nullopt, std::nullopt, kInsVelocity};
 
 TEST_CASE("Jacobian of the relative motion, scale and drift included") {
   Draws draws(1);
   for (int i = 0; i < 21; ++i) {
     const Vector x = random_estimate(draws).x;
     const Planar motion = draws.vector<3>(0.5);
-    for (const ChannelSlots& slots : {kVision, ChannelSlots{kInsClone, std::nullopt, std::nullopt}}) {
+    for (const ChannelSlots& slots : {kVision, kInertial}) {
       const auto h = [&](const Vector& d) {
         return Eigen::Vector3d(
             -relative_motion(plus(x, d), slots, motion, 0.3, Eigen::Matrix3d::Identity()).innovation);
@@ -58,8 +59,8 @@ TEST_CASE("a cloned pose is correlated as the pose is, and moves with it") {
   CHECK(e.P.block<3, 3>(kVoClone, kPos) == e.P.block<3, 3>(kPos, kPos));
   // Their difference is exactly known, so measuring "no motion" tells nothing of the place.
   const FusionEstimate before = e;
-  const Measurement<3> m = relative_motion(e.x, {kVoClone, std::nullopt, std::nullopt}, Planar::Zero(), 0.1,
-                                           1e-4 * Eigen::Matrix3d::Identity());
+  const Measurement<3> m = relative_motion(e.x, {kVoClone, std::nullopt, std::nullopt, std::nullopt}, Planar::Zero(),
+                                           0.1, 1e-4 * Eigen::Matrix3d::Identity());
   (void)kalman_update<3>(e, m.H, m.innovation, m.R);
   CHECK((e.P - before.P).norm() < 1e-9);
 }
