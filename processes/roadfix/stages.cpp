@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "gnss_ins_ekf/handler.h"
+#include "wheel_odometry/handler.h"
 
 namespace roadfix {
 
@@ -18,6 +19,7 @@ struct KnownStage {
 const std::vector<KnownStage>& known_stages() {
   static const std::vector<KnownStage> kStages = {
       {"gnss_ins_ekf", [](const std::filesystem::path& dir) { return make_gnss_ins_ekf(dir); }},
+      {"wheel_odometry", [](const std::filesystem::path& dir) { return make_wheel_odometry(dir); }},
   };
   return kStages;
 }
