@@ -35,7 +35,7 @@ std::vector<PoseCoordinates> control_points(const std::vector<PoseCoordinates>& 
     // Written with differences, so that equal samples give exactly their value.
     const PoseCoordinates far = (f[i - 2] - f[i]) + (f[i + 2] - f[i]);
     const PoseCoordinates near = (f[i - 1] - f[i]) + (f[i + 1] - f[i]);
-    c.push_back(f[i] + (13.0 * far - 112.0 * near) / 240.0);
+    c.emplace_back(f[i] + (13.0 * far - 112.0 * near) / 240.0);
   }
   return c;
 }
