@@ -69,7 +69,7 @@ def nees(runs):
     """NEES per degree of freedom of pose and velocity, mean over 50 simulated drives of two minutes."""
     ratios = []
     for seed in range(1, NEES_SEEDS + 1):
-        honesty = runs.simulated(CHANNEL, STAGES, "city_loop", seed, "--duration", 120)["honesty"]
+        honesty = runs.simulated(STAGES, "city_loop", seed, "--duration", 120)[CHANNEL]["honesty"]
         ratios.append((6 * honesty["pose"]["nees_per_dof"] + 3 * honesty["velocity_mps"]["nees_per_dof"]) / 9)
     return statistics.mean(ratios)
 

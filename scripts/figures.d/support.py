@@ -72,20 +72,25 @@ class Runs:
 
         return self.once(("import", drive, flags), run)
 
-    def simulated(self, channel, stages, scenario, seed, *flags):
-        """The figures of one channel on one simulated drive."""
+    def simulated(self, stages, scenario, seed, *flags, aligned=()):
+        """The figures of every channel on one simulated drive; `aligned` has pairs (channel, alignment) that differ from
+        what the channel's frame suggests. The errors of a channel lie in report/CHANNEL_errors.csv of its folder."""
 
         def run():
             folder = self.folder(scenario, seed, *flags)
-            log, vehicle, out = folder / "drive.lcm", folder / "vehicle", folder / "out.lcm"
+            log, vehicle, out, report = folder / "drive.lcm", folder / "vehicle", folder / "out.lcm", folder / "report"
             self.roadfix("simulate", scenario, "--seed", seed, *flags, "--out", log, "--vehicle", vehicle, "--overwrite")
             self.roadfix("replay", log, "--stages", stages, "--config", vehicle, "--out", out)
-            self.roadfix("evaluate", out, "--out", folder / "report", "--channel", channel)
+            self.roadfix("evaluate", out, "--out", report)
+            channels = json.loads((report / "figures.json").read_text())["channels"]
+            for channel, alignment in aligned:
+                self.roadfix("evaluate", out, "--out", report, "--channel", channel, "--align", alignment)
+                channels.update(json.loads((report / "figures.json").read_text())["channels"])
             log.unlink()
             out.unlink()
-            return json.loads((folder / "report" / "figures.json").read_text())["channels"][channel]
+            return channels
 
-        return self.once(("simulated", channel, stages, scenario, seed, flags), run)
+        return self.once(("simulated", stages, scenario, seed, flags, aligned), run)
 
     def folder(self, *words):
         name = "_".join(str(word).lstrip("-").replace(",", "_") for word in words) or "run"
@@ -113,7 +118,8 @@ class Runs:
             self.roadfix("evaluate", out, "--out", report, "--channel", channel, *evaluate)
             figures = json.loads((report / "figures.json").read_text())
             out.unlink()  # windows make dozens of runs; the figures are what is kept
-            self.imported(drive, *flags)[0].unlink(missing_ok=True)
+            self.imported(drive, *flags)[0].unlink()
+            del self.known[("import", drive, flags)], self.known[("replay", stages, drive, flags)]
             return figures["channels"][channel]
 
         return self.once(("score", channel, stages, drive, flags, evaluate), run)

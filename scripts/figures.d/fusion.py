@@ -1,0 +1,105 @@
+"""fusion: POSE_FUSED through outages, against the truth of simulated drives and of adis_semisim."""
+import csv
+import statistics
+
+from support import Skipped, root_mean_square
+
+CHANNEL = "POSE_FUSED"
+BLIND = "wheel_odometry,gnss_ins_ekf,imm_fusion"  # wheels and IMU alone
+SEEING = "wheel_odometry,gnss_ins_ekf,vo_tracker,imm_fusion"
+SEEDS = range(1, 21)
+LEAST_AVAILABILITY = 0.99
+
+
+def usable(figures):
+    return figures["availability"]["valid"] + figures["availability"]["coasting"]
+
+
+def dark_channels(runs, seed):
+    """The figures of all channels on tunnel_dark. POSE_WHEEL has no ENU frame: it takes yaw and position over from the
+    reference once, at the last pose before the loss."""
+    return runs.simulated(BLIND, "tunnel_dark", seed, aligned=(("POSE_WHEEL", "tied"),))
+
+
+def dark(runs, seed):
+    """The fused ones; a channel that is silent where it is hard does not count."""
+    figures = dark_channels(runs, seed)[CHANNEL]
+    if usable(figures) < LEAST_AVAILABILITY:
+        raise Skipped(f"tunnel_dark, seed {seed}: available {usable(figures):.3f} of the time, 0.99 is asked for")
+    return figures
+
+
+def outages(runs):
+    for seed in SEEDS:
+        yield from dark(runs, seed)["outages"]["each"]
+
+
+def dark_end_pct(runs):
+    return statistics.median(100 * o["horizontal_m"] / o["distance_m"] for o in outages(runs))
+
+
+def transition_ratio(runs):
+    """Largest error within 5 s of loss or return over the error at the outage's end; median of the seeds."""
+    return statistics.median(o["transition_peak_m"] / o["horizontal_m"] for o in outages(runs))
+
+
+def nees(runs):
+    def ratio(honesty):
+        return (6 * honesty["pose"]["nees_per_dof"] + 3 * honesty["velocity_mps"]["nees_per_dof"]) / 9
+
+    return statistics.mean(ratio(dark(runs, seed)["honesty"]) for seed in SEEDS)
+
+
+def within_3sigma(runs):
+    return statistics.mean(dark(runs, seed)["honesty"]["position_m"]["within_3sigma"] for seed in SEEDS)
+
+
+def mpa_balanced_pct(runs):
+    return statistics.mean(dark(runs, seed)["mpa"]["balanced_percent"] for seed in SEEDS)
+
+
+def squared_errors(path, borders_us):
+    """Squared horizontal errors of an errors.csv: before the loss, in the outage, after the return."""
+    segments = [[], [], []]
+    with open(path, newline="") as file:
+        for row in csv.DictReader(file):
+            segment = sum(int(row["utime_us"]) >= border for border in borders_us)
+            segments[segment].append(float(row["longitudinal_m"]) ** 2 + float(row["lateral_m"]) ** 2)
+    return segments
+
+
+def ate_vs_best(runs):
+    """Fused over the best single channel before, in and after the outage, the worst of the three; RMSE over the seeds."""
+    pooled = {channel: [[], [], []] for channel in (CHANNEL, "POSE_INS", "POSE_WHEEL")}
+    for seed in SEEDS:
+        outage = dark(runs, seed)["outages"]["each"][0]
+        borders = (outage["first_withheld_us"], outage["return_us"])
+        for channel, segments in pooled.items():
+            path = runs.folder("tunnel_dark", seed) / "report" / f"{channel}_errors.csv"
+            for segment, values in zip(segments, squared_errors(path, borders)):
+                segment += values
+    rmse = {channel: [statistics.mean(s) ** 0.5 for s in segments] for channel, segments in pooled.items()}
+    return max(rmse[CHANNEL][k] / min(rmse["POSE_INS"][k], rmse["POSE_WHEEL"][k]) for k in range(3))
+
+
+def adis_wheels_60s_m(runs):
+    return runs.windows(CHANNEL, BLIND, "adis_semisim", 60, 300, 180, (0, 30, 60, 90, 120, 150))
+
+
+def malaga_20s_m(runs):
+    """The drive's one window, against the fixes, the receiver's constant latency fitted."""
+    cut = ("--cut-gnss", 20, "--every", 100, "--after", 20, "--phase", 0)
+    figures = runs.scored(CHANNEL, SEEING, "malaga07_part1", *cut, evaluate=("--fit-latency",))
+    return root_mean_square(outage["horizontal_m"] for outage in figures["outages"]["each"])
+
+
+MEASUREMENTS = {
+    "dark_end_pct": dark_end_pct,
+    "transition_ratio": transition_ratio,
+    "ate_vs_best": ate_vs_best,
+    "mpa_balanced_pct": mpa_balanced_pct,
+    "nees": nees,
+    "within_3sigma": within_3sigma,
+    "adis_wheels_60s_m": adis_wheels_60s_m,
+    "malaga_20s_m": malaga_20s_m,
+}
