@@ -256,7 +256,7 @@ function card(c) {
     add("vertical RMSE", `${digits(e.vertical_m.rmse)} m`);
     if (e.yaw_deg) add("yaw RMSE", `${digits(e.yaw_deg.rmse)} deg`);
     if (f.kitti) add("drift (KITTI)", `${digits(f.kitti.translation_percent)} %`);
-    add("within 3 sigma", `${(100 * f.honesty.position_m.within_3sigma).toFixed(1)} %`);
+    if (f.honesty.position_m.samples) add("within 3 sigma", `${(100 * f.honesty.position_m.within_3sigma).toFixed(1)} %`);
   }
   if (f.outages.count) add(`end of ${f.outages.count} outages, RMS`, `${digits(f.outages.horizontal_m.rmse)} m`);
   add("valid or coasting", `${(100 * (f.availability.valid + f.availability.coasting)).toFixed(1)} %`);

@@ -43,6 +43,7 @@ std::string honesty_row(const std::string& name, const HonestyRow& r, double uni
 }
 
 std::string honesty_rows(const Honesty& h) {
+  if (h.position.samples == 0) return "  covariance: none that is positive definite\n";
   std::string text =
       fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "covariance", "NEES/dof", "error", "sigma", "in 3 s");
   text += honesty_row("horizontal m", h.horizontal);
@@ -131,7 +132,7 @@ std::string overview(const EvaluationReport& report) {
                         any ? number(c.axes.horizontal.rms) : "-", any ? number(c.axes.horizontal.p95) : "-",
                         any ? number(c.axes.vertical.rms) : "-",
                         any && c.axes.yaw ? number(c.axes.yaw->rms / kDegree) : "-",
-                        any ? percent(c.honesty.position.within_3sigma) : "-",
+                        c.honesty.position.samples > 0 ? percent(c.honesty.position.within_3sigma) : "-",
                         fmt::format("{:.1f} %", 100.0 * (c.availability.valid + c.availability.coasting)));
   }
   return text;

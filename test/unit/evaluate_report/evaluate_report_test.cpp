@@ -72,6 +72,22 @@ TEST_CASE("a log is read back to the figures that were put in") {
   CHECK(page.find("https://") == std::string::npos);
 }
 
+TEST_CASE("an estimate without covariance is said to have none") {
+  const Folder folder("covariance");
+  const SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    small.write_estimate(writer, "POSE_VO", [](double, pose_t& m) {
+      for (auto& row : m.cov_pose_m2_rad2) std::fill(row, row + 6, 0.0);
+    });
+    writer.commit();
+  }
+  const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  CHECK(report.channels[0].honesty.position.unusable == report.channels[0].pairs);
+  CHECK(report_table(report).find("covariance: none") != std::string::npos);
+}
+
 TEST_CASE("an estimate in another ENU frame lands on the reference") {
   const Folder folder("anchors");
   const SmallLog small;
