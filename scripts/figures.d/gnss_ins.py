@@ -91,6 +91,7 @@ MEASUREMENTS = {
     "car_30s_m": car_window(30, 90, (0, 15, 30, 45, 60, 75)),
     "car_60s_m": car_window(60, 120, (0, 20, 40, 60, 80, 100)),
     "nees": nees,
+    "cost_us": lambda runs: runs.benchmark("gnss_ins_bench", "cpu_per_imu_sample_s") * 1e6,
     "car_1hz_h_m": lambda runs: car_1hz(runs)["errors"]["horizontal_m"]["rmse"],
     "car_within_3sigma": lambda runs: car_1hz(runs)["honesty"]["position_m"]["within_3sigma"],
 }

@@ -58,6 +58,14 @@ class Runs:
             raise Skipped(f"{' '.join(words[:3])} ended with {done.returncode}: {last}")
         return done.stdout
 
+    def benchmark(self, program, counter):
+        """A counter of a benchmark program's only benchmark; median of five repetitions."""
+        flags = ("--benchmark_format=json", "--benchmark_repetitions=5", "--benchmark_report_aggregates_only=true")
+        for row in json.loads(self.call(self.program(program), *flags))["benchmarks"]:
+            if row.get("aggregate_name") == "median" and counter in row:
+                return row[counter]
+        raise Skipped(f"{program} printed no median of {counter}")
+
     def roadfix(self, *arguments):
         return self.call(self.program("roadfix"), *arguments)
 
