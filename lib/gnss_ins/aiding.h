@@ -27,8 +27,8 @@ Measurement<1> vehicle_yaw(const NavState& x, double yaw, double sigma);
 Measurement<1> wheel_speed(const NavState& x, const Motion& motion, double speed, double sigma, double ahead,
                            const Eigen::Vector3d& p_imu_vehicle);
 
-/// Sideways and vertical speed of the vehicle at its point without sideslip: zero.
-Measurement<2> no_sideslip(const NavState& x, const Motion& motion, double sigma, const Eigen::Vector3d& p_imu_vehicle);
+/// Sideways and vertical speed of the vehicle at its point without sideslip: zero. R is the caller's.
+Measurement<2> no_sideslip(const NavState& x, const Motion& motion, const Eigen::Vector3d& p_imu_vehicle);
 
 /// Standing: velocity zero.
 Measurement<3> zero_velocity(const NavState& x, double sigma);

@@ -41,8 +41,7 @@ Measurement<1> wheel_speed(const NavState& x, const Motion& motion, double speed
   return m;
 }
 
-Measurement<2> no_sideslip(const NavState& x, const Motion& motion, double sigma,
-                           const Eigen::Vector3d& p_imu_vehicle) {
+Measurement<2> no_sideslip(const NavState& x, const Motion& motion, const Eigen::Vector3d& p_imu_vehicle) {
   const VehicleVelocity v(x, motion, 0.0, p_imu_vehicle);
   // At x behind the origin: v + rate x (-x, 0, 0), (M.29).
   const double behind = x.no_slip_x;
@@ -56,7 +55,6 @@ Measurement<2> no_sideslip(const NavState& x, const Motion& motion, double sigma
   m.H.block<1, 3>(1, kGyroBias) += behind * rate_bias.row(1);
   m.H(0, kNoSlipX) = -v.rate.z();
   m.H(1, kNoSlipX) = v.rate.y();
-  m.R = sigma * sigma * Eigen::Matrix2d::Identity();
   return m;
 }
 

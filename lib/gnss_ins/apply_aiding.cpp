@@ -29,7 +29,8 @@ Gates::Gates(double sigma) {
   for (int dof = 1; dof <= 3; ++dof) nis[static_cast<size_t>(dof)] = chi_square_quantile(1.0 - tail, dof);
 }
 
-AidingApplier::AidingApplier(const GnssInsConfig& config) : config_(config) {}
+AidingApplier::AidingApplier(const GnssInsConfig& config)
+    : config_(config), lateral_(config.sideslip), vertical_(config.sideslip) {}
 
 AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& gates) const {
   const GnssInsVehicle& v = config_.vehicle;
@@ -87,12 +88,29 @@ AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates&
   return core.fuse(AidingSource::kWheelSpeed, p.t_us, m, gates.nis[1]);
 }
 
-AidingRecord AidingApplier::sideslip(InsCore& core, const Gates& gates) const {
+AidingRecord AidingApplier::sideslip(InsCore& core, const Gates& gates, bool learns) {
+  return hold_track(core, 0, lateral_, gates.nis[1], learns);
+}
+
+AidingRecord AidingApplier::heave(InsCore& core, const Gates& gates, bool learns) {
+  return hold_track(core, 1, vertical_, gates.nis[1], learns);
+}
+
+AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate, bool learns) const {
   const NavState& x = core.state();
-  const AidingConfig& a = config_.aiding;
-  const double sigma = std::hypot(a.sideslip_std, a.sideslip_per_speed * x.velocity.norm());
-  return core.fuse(AidingSource::kNoSideslip, x.t_us,
-                   no_sideslip(x, core.motion(), sigma, config_.vehicle.p_imu_vehicle), gates.nis[2]);
+  const Measurement<2> both = no_sideslip(x, core.motion(), config_.vehicle.p_imu_vehicle);
+  // Tyres slip with the lateral acceleration, springs give with any.
+  const Motion& motion = core.motion();
+  const double acceleration = axis == 0 ? x.velocity.norm() * motion.rate.z() : motion.acceleration.head<2>().norm();
+  const double sigma = noise.sigma(acceleration);
+  Measurement<1> m;
+  m.residual(0) = both.residual(axis);
+  m.H = both.H.row(axis);
+  m.R(0, 0) = sigma * sigma;
+  const AidingRecord r = core.fuse(AidingSource::kNoSideslip, x.t_us, m, gate);
+  if (learns && x.velocity.norm() > config_.sideslip.min_speed && r.status != AidingStatus::kBadInput)
+    noise.learn(m.residual(0), r.innovation_variance[0] - m.R(0, 0), acceleration);
+  return r;
 }
 
 AidingRecord AidingApplier::standing_velocity(InsCore& core, const Gates& gates) const {

@@ -5,6 +5,7 @@
 #include "gnss_ins/imu_monitor.h"
 #include "gnss_ins/ins_core.h"
 #include "gnss_ins/pending.h"
+#include "gnss_ins/sideslip.h"
 
 namespace roadfix {
 
@@ -24,14 +25,24 @@ class AidingApplier {
   AidingRecord apply_level(InsCore& core, const Pending& p, const Gates& gates) const;
   AidingRecord apply_height(InsCore& core, const Pending& p, const Gates& gates) const;
 
-  AidingRecord sideslip(InsCore& core, const Gates& gates) const;
+  /// Each learns its noise where `learns`.
+  AidingRecord sideslip(InsCore& core, const Gates& gates, bool learns);
+  AidingRecord heave(InsCore& core, const Gates& gates, bool learns);
   AidingRecord standing_velocity(InsCore& core, const Gates& gates) const;
   AidingRecord standing_rate(InsCore& core, const ImuBlock& block, const Gates& gates) const;
 
+  template <class Archive>
+  void serialise(Archive& a) {
+    lateral_.serialise(a);
+    vertical_.serialise(a);
+  }
+
  private:
+  AidingRecord hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate, bool learns) const;
   AidingRecord wheels(InsCore& core, const Pending& p, const Gates& gates) const;
 
   GnssInsConfig config_;
+  SideslipNoise lateral_, vertical_;
 };
 
 }  // namespace roadfix

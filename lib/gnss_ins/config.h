@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <cstdint>
 
 namespace roadfix {
@@ -28,6 +29,18 @@ struct GnssInsVehicle {
   Eigen::Vector3d p_imu_vehicle = Eigen::Vector3d::Zero();          ///< m, where wheels measure, imu axes
 };
 
+/// Latencies and clock offset show only as differences, so one clock must define time: the better one by calibration,
+/// the stamps of GNSS positions or those of the IMU. The pose is for its utime on that clock, (M.19).
+struct TimePriors {
+  double imu_offset = 0.0, position_latency = 0.0, velocity_latency = 0.0;  ///< s, standard deviations
+  explicit TimePriors(const GnssInsVehicle& v) {
+    const bool gnss_defines = v.position_latency_std <= v.time_offset_std;
+    const double both = std::hypot(v.position_latency_std, v.time_offset_std);
+    (gnss_defines ? imu_offset : position_latency) = both;
+    velocity_latency = std::hypot(v.velocity_latency_std, gnss_defines ? v.position_latency_std : v.time_offset_std);
+  }
+};
+
 /// Gates and floors of the measurements.
 struct AidingConfig {
   double gate_sigma = 5.0;          ///< of each block, by chi-square at this many Gaussian sigmas
@@ -35,13 +48,12 @@ struct AidingConfig {
   double velocity_floor = 0.02;     ///< m/s
   double velocity_default = 0.1;    ///< m/s, where the receiver gives no sigma
   double heading_floor = 0.1;       ///< deg
-  double sideslip_std = 0.1;        ///< m/s, of the no-sideslip constraint
-  double sideslip_per_speed = 0.0;  ///< 1, added sigma per speed
-  double sideslip_interval = 0.5;   ///< s between two uses: its errors are correlated
+  double sideslip_interval = 0.2;   ///< s between two uses: its errors are correlated
+  double heave_interval = 1.0;      ///< s, likewise, for the vertical axis
   double wheel_interval = 0.1;      ///< s
   double no_slip_x_std = 1.0;       ///< m
   double zero_velocity_std = 0.02;  ///< m/s
-  double zero_rate_std = 5.0e-4;    ///< rad/s
+  double zero_rate_std = 2.0e-3;    ///< rad/s
   double zero_interval = 0.5;       ///< s
   double mag_std = 0.1;             ///< rad
   bool use_gnss_velocity = true;
@@ -49,6 +61,18 @@ struct AidingConfig {
   bool use_wheels = true;
   bool use_zero_velocity = true;
   bool use_mag = true;
+};
+
+/// The no-sideslip constraint's noise, one learner for each axis.
+struct SideslipConfig {
+  double start_std = 0.1;       ///< m/s, before anything is learnt
+  double min_std = 0.003;       ///< m/s
+  double max_std = 0.5;         ///< m/s
+  double doubling_accel = 1.0;  ///< m/s2 of lateral acceleration that doubles it
+  double prior_count = 5.0;     ///< residuals that the start counts for
+  double memory_count = 400.0;  ///< residuals
+  double confidence = 3.0;      ///< sigmas of the learnt variance that are added to it
+  double min_speed = 2.0;       ///< m/s, to learn
 };
 
 /// How the filter moves between measurements.
@@ -92,6 +116,7 @@ struct AlignmentConfig {
 /// One set for every vehicle.
 struct GnssInsTuning {
   AidingConfig aiding;
+  SideslipConfig sideslip;
   PropagationConfig propagation;
   GnssScreenConfig screen;
   AlignmentConfig alignment;
@@ -108,9 +133,8 @@ void visit(AidingConfig& c, Visitor& v) {
   v.number("velocity_floor_mps", c.velocity_floor, 0.0, 10.0);
   v.number("velocity_default_mps", c.velocity_default, 1e-3, 10.0);
   v.number("heading_floor_deg", c.heading_floor, 0.0, 90.0);
-  v.number("sideslip_std_mps", c.sideslip_std, 1e-3, 10.0);
-  v.number("sideslip_per_speed", c.sideslip_per_speed, 0.0, 1.0);
   v.number("sideslip_interval_s", c.sideslip_interval, 0.01, 100.0);
+  v.number("heave_interval_s", c.heave_interval, 0.01, 100.0);
   v.number("wheel_interval_s", c.wheel_interval, 0.0, 100.0);
   v.number("no_slip_x_std_m", c.no_slip_x_std, 0.0, 10.0);
   v.number("zero_velocity_std_mps", c.zero_velocity_std, 1e-4, 1.0);
@@ -122,6 +146,18 @@ void visit(AidingConfig& c, Visitor& v) {
   v.boolean("use_wheels", c.use_wheels);
   v.boolean("use_zero_velocity", c.use_zero_velocity);
   v.boolean("use_mag", c.use_mag);
+}
+
+template <class Visitor>
+void visit(SideslipConfig& c, Visitor& v) {
+  v.number("start_std_mps", c.start_std, 1e-3, 10.0);
+  v.number("min_std_mps", c.min_std, 1e-4, 10.0);
+  v.number("max_std_mps", c.max_std, 1e-3, 10.0);
+  v.number("doubling_accel_mps2", c.doubling_accel, 0.01, 1e6);
+  v.number("prior_count", c.prior_count, 1.0, 1e6);
+  v.number("memory_count", c.memory_count, 1.0, 1e6);
+  v.number("confidence", c.confidence, 0.0, 100.0);
+  v.number("min_speed_mps", c.min_speed, 0.0, 100.0);
 }
 
 template <class Visitor>
@@ -165,6 +201,7 @@ void visit(AlignmentConfig& c, Visitor& v) {
 template <class Visitor>
 void visit(GnssInsTuning& c, Visitor& v) {
   v.group("aiding", c.aiding);
+  v.group("sideslip", c.sideslip);
   v.group("propagation", c.propagation);
   v.group("screen", c.screen);
   v.group("alignment", c.alignment);

@@ -51,7 +51,11 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
   noise.segment<6>(kGyroScale).setConstant(gain * v.scale_std * v.scale_std);
   noise(kWheelScale) = p.wheel_scale_walk * p.wheel_scale_walk * s.duration;
   noise.segment<2>(kMounting).setConstant(p.mounting_walk * p.mounting_walk * s.duration);
-  if (v.time_offset_std > 0.0) noise(kImuOffset) = p.time_offset_walk * p.time_offset_walk * s.duration;
+  // The IMU's clock drifts against the receiver's; where the IMU defines time, the fixes do.
+  const TimePriors time(v);
+  const double walk = p.time_offset_walk * p.time_offset_walk * s.duration;
+  if (time.imu_offset > 0.0) noise(kImuOffset) = walk;
+  if (time.position_latency > 0.0 && v.time_offset_std > 0.0) noise(kPositionLatency) = walk;
 }
 
 ErrorMatrix Transition::dense() const {

@@ -9,17 +9,21 @@ namespace roadfix {
 
 namespace {
 
-constexpr double kMaxLag = 1.5;       // s behind the horizon, for receivers that stamp late
-constexpr double kBridgeAccel = 2.0;  // m/s2, what a car may do unseen in a gap of the IMU
-constexpr double kBridgeRate = 0.3;   // rad/s
+constexpr double kMaxLag = 1.5;         // s behind the horizon, for receivers that stamp late
+constexpr double kBridgeAccel = 2.0;    // m/s2, what a car may do unseen in a gap of the IMU
+constexpr double kSideslipShown = 3.0;  // s since the last position, to learn the car's sideslip
+constexpr double kBridgeRate = 0.3;     // rad/s
 
 bool plausible(const ImuSample& s, const PropagationConfig& c) {
   return s.gyro.allFinite() && s.accel.allFinite() && s.gyro.norm() < c.max_gyro && s.accel.norm() < c.max_accel;
 }
 
-int64_t lag_of(const GnssInsVehicle& v) {
-  const double latency = std::max(v.position_latency_std, v.velocity_latency_std);
-  return static_cast<int64_t>(1e6 * std::min(kMaxLag, 3.0 * std::hypot(latency, v.time_offset_std)));
+// The state stays behind the horizon by the longest latency that is possible yet.
+int64_t lag_of(double age_s) { return static_cast<int64_t>(1e6 * std::clamp(age_s, 0.0, kMaxLag)); }
+
+double prior_age(const GnssInsVehicle& v) {
+  const TimePriors time(v);
+  return 3.0 * std::hypot(std::max(time.position_latency, time.velocity_latency), time.imu_offset);
 }
 
 }  // namespace
@@ -32,7 +36,7 @@ GnssIns::GnssIns(const GnssInsConfig& config)
       monitor_(config),
       screen_(config.screen),
       bank_(config),
-      lag_us_(lag_of(config.vehicle)) {
+      lag_us_(lag_of(prior_age(config.vehicle))) {
   no_gates_.nis.fill(1e12);
   records_.reserve(1024);
 }
@@ -140,6 +144,7 @@ void GnssIns::note(AidingRecord record, int64_t id) {
   record.id = id;
   if (record.status == AidingStatus::kAccepted || record.status == AidingStatus::kReset)
     used_at_us_[static_cast<size_t>(record.source)] = record.t_us;
+  forward_stale_ = true;
   if (records_.size() < records_.capacity()) records_.push_back(record);
 }
 
@@ -162,10 +167,12 @@ void GnssIns::step(const ImuSample& imu) {
     core_.reset();
     bank_.stop();
     pending_.clear();
+    lag_us_ = lag_of(prior_age(config_.vehicle));
   }
   if (phase_ == AlignmentPhase::kDone) {
     core_->predict(imu, dt, noise);
     step_aligned(imu, block_done);
+    if (block_done) lag_us_ = lag_of(core_->longest_age());
   } else if (phase_ == AlignmentPhase::kHeading) {
     step_heading(imu, dt, noise, block_done);
   } else {
@@ -177,20 +184,23 @@ void GnssIns::step(const ImuSample& imu) {
 void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
   InsCore& core = *core_;
   pending_.take_due([&]() -> const NavState& { return core.state(); }, [&](const Pending& p) { use(p); });
-  if (config_.aiding.use_sideslip && imu.t_us >= next_sideslip_us_) {
-    next_sideslip_us_ = imu.t_us + static_cast<int64_t>(1e6 * config_.aiding.sideslip_interval);
-    note(applier_.sideslip(core, gates_), 0);
-    forward_stale_ = true;
-  }
+  const bool shown = seconds_between(used_at_us_[0], imu.t_us) < kSideslipShown;
+  if (due(next_sideslip_us_, imu.t_us, config_.aiding.sideslip_interval))
+    note(applier_.sideslip(core, gates_, shown), 0);
+  if (due(next_heave_us_, imu.t_us, config_.aiding.heave_interval)) note(applier_.heave(core, gates_, shown), 0);
   if (block_done && standing_now(core)) {
     note(applier_.standing_velocity(core, gates_), 0);
     note(applier_.standing_rate(core, monitor_.block(), gates_), 0);
-    forward_stale_ = true;
   }
 }
 
+bool GnssIns::due(int64_t& next_us, int64_t t_us, double interval) const {
+  if (!config_.aiding.use_sideslip || t_us < next_us) return false;
+  next_us = t_us + static_cast<int64_t>(1e6 * interval);
+  return true;
+}
+
 void GnssIns::use(const Pending& p) {
-  forward_stale_ = true;
   if (p.kind == PendingKind::kPosition)
     use_position(p);
   else

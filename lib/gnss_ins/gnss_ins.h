@@ -72,6 +72,7 @@ class GnssIns {
   void step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done);
   void try_start(const ImuSample& imu);
   bool standing_now(const InsCore& core) const;
+  bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
   void use_position(const Pending& p);
   void recover(const Pending& p);
@@ -100,7 +101,7 @@ class GnssIns {
   int64_t cov_at_us_ = 0;  // epoch of the cached output covariance
   Matrix6d cov_pose_ = Matrix6d::Zero();
   Eigen::Matrix3d cov_velocity_ = Eigen::Matrix3d::Zero();
-  int64_t next_sideslip_us_ = 0;
+  int64_t next_sideslip_us_ = 0, next_heave_us_ = 0;
   int64_t last_wheel_us_ = 0;
   std::optional<GnssFix> fix_, fix_before_;  // newest good ones, for the start
   std::optional<double> wheel_speed_;

@@ -34,9 +34,10 @@ ErrorMatrix start_covariance(const GnssInsConfig& c, double yaw_std) {
   std.segment<6>(kGyroScale).setConstant(v.scale_std);
   std(kWheelScale) = v.wheel_scale_std;
   std.segment<2>(kMounting) = v.mounting_std.tail<2>();
-  std(kPositionLatency) = v.position_latency_std;
-  std(kVelocityLatency) = v.velocity_latency_std;
-  std(kImuOffset) = v.time_offset_std;
+  const TimePriors time(v);
+  std(kPositionLatency) = time.position_latency;
+  std(kVelocityLatency) = time.velocity_latency;
+  std(kImuOffset) = time.imu_offset;
   std(kNoSlipX) = c.aiding.no_slip_x_std;
   return std.cwiseAbs2().asDiagonal();
 }

@@ -7,7 +7,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr double kNoiseTime = 1.0;  // s, memory of the scatter
+constexpr double kNoiseTime = 2.0;  // s, memory of the scatter
 constexpr int kManySamples = 1000;  // count no further
 
 }  // namespace
@@ -18,21 +18,35 @@ ImuMonitor::ImuMonitor(const GnssInsConfig& config)
       factor_(config.propagation.vibration_factor),
       block_s_(config.aiding.zero_interval) {}
 
-bool ImuMonitor::add(const ImuSample& imu, double dt) {
-  repeats_ = count_ > 0 && imu.gyro == one_.gyro && imu.accel == one_.accel ? repeats_ + 1 : 0;
-  if (count_ >= 2) {
-    // A second difference of white noise has six times its variance; mean of three axes.
-    const double gyro = (imu.gyro - 2.0 * one_.gyro + two_.gyro).squaredNorm() / 18.0;
-    const double accel = (imu.accel - 2.0 * one_.accel + two_.accel).squaredNorm() / 18.0;
+void NoiseBand::add(const ImuSample& imu, double dt) {
+  gyro_sum_ += imu.gyro;
+  accel_sum_ += imu.accel;
+  time_ += dt;
+  if (++samples_ < length_) return;
+  const Eigen::Vector3d gyro = gyro_sum_ / length_, accel = accel_sum_ / length_;
+  if (means_ >= 2) {
     // Until the memory is full, the plain mean.
-    const double weight = std::max(dt / (dt + kNoiseTime), 1.0 / (count_ - 1));
-    gyro_variance_ += weight * (gyro - gyro_variance_);
-    accel_variance_ += weight * (accel - accel_variance_);
+    const double weight = std::max(time_ / (time_ + kNoiseTime), 1.0 / (means_ - 1));
+    gyro_ += weight * ((gyro - 2.0 * gyro_one_ + gyro_two_).squaredNorm() / 18.0 * time_ - gyro_);
+    accel_ += weight * ((accel - 2.0 * accel_one_ + accel_two_).squaredNorm() / 18.0 * time_ - accel_);
   }
-  dt_ = dt;
-  two_ = one_;
-  one_ = imu;
-  count_ = std::min(count_ + 1, kManySamples);
+  gyro_two_ = gyro_one_;
+  gyro_one_ = gyro;
+  accel_two_ = accel_one_;
+  accel_one_ = accel;
+  means_ = std::min(means_ + 1, kManySamples);
+  gyro_sum_.setZero();
+  accel_sum_.setZero();
+  time_ = 0.0;
+  samples_ = 0;
+}
+
+ImuNoise NoiseBand::density() const { return {std::sqrt(gyro_), std::sqrt(accel_)}; }
+
+bool ImuMonitor::add(const ImuSample& imu, double dt) {
+  repeats_ = imu.gyro == last_.gyro && imu.accel == last_.accel ? repeats_ + 1 : 0;
+  last_ = imu;
+  for (NoiseBand& band : bands_) band.add(imu, dt);
 
   const double elapsed = times_.sum();
   const int quarter = std::min(kQuarters - 1, static_cast<int>(elapsed / block_s_ * kQuarters));
@@ -62,9 +76,13 @@ void ImuMonitor::finish_block(int64_t t_us) {
 }
 
 ImuNoise ImuMonitor::noise() const {
-  const double scale = factor_ * std::sqrt(dt_);
-  return {std::max(spec_gyro_, scale * std::sqrt(gyro_variance_)),
-          std::max(spec_accel_, scale * std::sqrt(accel_variance_))};
+  ImuNoise quietest = bands_.front().density();
+  for (const NoiseBand& band : bands_) {
+    if (!band.known()) continue;
+    quietest.gyro = std::min(quietest.gyro, band.density().gyro);
+    quietest.accel = std::min(quietest.accel, band.density().accel);
+  }
+  return {std::max(spec_gyro_, factor_ * quietest.gyro), std::max(spec_accel_, factor_ * quietest.accel)};
 }
 
 }  // namespace roadfix

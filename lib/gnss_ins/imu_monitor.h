@@ -1,6 +1,8 @@
 /// What the raw IMU samples alone tell: their white noise as it is now, and whether the car may be standing.
 #pragma once
 
+#include <array>
+
 #include "gnss_ins/config.h"
 #include "gnss_ins/ins_core.h"
 #include "samples/samples.h"
@@ -17,6 +19,30 @@ struct ImuBlock {
   double accel_wander = 0.0;                        ///< m/s2, likewise
 };
 
+/// White noise density seen through second differences of means over `length` samples. A second difference of white
+/// noise has six times its variance; a car's motion hardly reaches it, a vibration does.
+class NoiseBand {
+ public:
+  explicit NoiseBand(int length) : length_(length) {}
+  void add(const ImuSample& imu, double dt);
+  [[nodiscard]] ImuNoise density() const;
+  [[nodiscard]] bool known() const { return means_ > 12; }
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    a(gyro_sum_, accel_sum_, time_, gyro_one_, gyro_two_, accel_one_, accel_two_, samples_, means_, gyro_, accel_);
+  }
+
+ private:
+  int length_;
+  Eigen::Vector3d gyro_sum_ = Eigen::Vector3d::Zero(), accel_sum_ = Eigen::Vector3d::Zero();
+  double time_ = 0.0;
+  Eigen::Vector3d gyro_one_ = Eigen::Vector3d::Zero(), gyro_two_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_one_ = Eigen::Vector3d::Zero(), accel_two_ = Eigen::Vector3d::Zero();
+  int samples_ = 0, means_ = 0;
+  double gyro_ = 0.0, accel_ = 0.0;  ///< densities squared
+};
+
 class ImuMonitor {
  public:
   explicit ImuMonitor(const GnssInsConfig& config);
@@ -24,7 +50,8 @@ class ImuMonitor {
   /// Returns true when this sample completes a block.
   bool add(const ImuSample& imu, double dt);
 
-  /// (M.17): from second differences, which a car's motion hardly reaches and white noise fills.
+  /// (M.17): white noise shows alike in every band, a vibration in some and motion in the slow one; the quietest band
+  /// therefore tells the white noise.
   [[nodiscard]] ImuNoise noise() const;
   [[nodiscard]] const ImuBlock& block() const { return block_; }
   /// Identical readings for longer than a sensor with noise can give.
@@ -39,9 +66,9 @@ class ImuMonitor {
   void finish_block(int64_t t_us);
 
   double spec_gyro_, spec_accel_, factor_, block_s_;
-  ImuSample one_, two_;  // the last two samples
-  int count_ = 0, repeats_ = 0;
-  double gyro_variance_ = 0.0, accel_variance_ = 0.0, dt_ = 0.0;
+  ImuSample last_;
+  int repeats_ = 0;
+  std::array<NoiseBand, 3> bands_{NoiseBand(1), NoiseBand(4), NoiseBand(16)};
   Eigen::Matrix<double, 6, kQuarters> sums_ = Eigen::Matrix<double, 6, kQuarters>::Zero();
   Eigen::Vector4d times_ = Eigen::Vector4d::Zero();
   ImuBlock block_;
@@ -49,9 +76,9 @@ class ImuMonitor {
 
 template <class Archive>
 void ImuMonitor::serialise(Archive& a) {
-  a(one_.t_us, one_.gyro, one_.accel, two_.t_us, two_.gyro, two_.accel, count_, repeats_, gyro_variance_,
-    accel_variance_, dt_, sums_, times_, block_.end_us, block_.duration, block_.gyro, block_.accel, block_.gyro_wander,
-    block_.accel_wander);
+  a(last_.t_us, last_.gyro, last_.accel, repeats_, sums_, times_, block_.end_us, block_.duration, block_.gyro,
+    block_.accel, block_.gyro_wander, block_.accel_wander);
+  for (NoiseBand& band : bands_) band.serialise(a);
 }
 
 }  // namespace roadfix

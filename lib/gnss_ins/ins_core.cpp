@@ -1,5 +1,6 @@
 #include "gnss_ins/ins_core.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace roadfix {
@@ -44,6 +45,16 @@ ErrorMatrix InsCore::covariance() const {
   ErrorMatrix P = P_;
   if (sums_.duration > 0.0) propagate_covariance(P, Transition(sums_, earth_.rate(), config_), sums_);
   return P;
+}
+
+double InsCore::longest_age() const {
+  double longest = 0.0;
+  for (const int latency : {kPositionLatency, kVelocityLatency}) {
+    const double mean = (latency == kPositionLatency ? x_.position_latency : x_.velocity_latency) - x_.imu_offset;
+    const double variance = P_(latency, latency) + P_(kImuOffset, kImuOffset) - 2.0 * P_(latency, kImuOffset);
+    longest = std::max(longest, mean + 3.0 * std::sqrt(std::max(variance, 0.0)));
+  }
+  return longest;
 }
 
 void InsCore::flush() {

@@ -46,6 +46,8 @@ class InsCore {
 
   [[nodiscard]] const NavState& state() const { return x_; }
   [[nodiscard]] ErrorMatrix covariance() const;  ///< at the state's epoch
+  /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.
+  [[nodiscard]] double longest_age() const;
   [[nodiscard]] const Motion& motion() const { return motion_; }
   [[nodiscard]] const InertialStep& last_step() const { return last_; }
   [[nodiscard]] EarthModel& earth() { return earth_; }

@@ -77,7 +77,7 @@ TEST_CASE("wheel speed Jacobian") {
 }
 
 TEST_CASE("no sideslip Jacobian") {
-  check_everywhere<2>([](const NavState& x, const Motion& m) { return no_sideslip(x, m, 0.1, kLever); });
+  check_everywhere<2>([](const NavState& x, const Motion& m) { return no_sideslip(x, m, kLever); });
 }
 
 TEST_CASE("standing Jacobians") {
