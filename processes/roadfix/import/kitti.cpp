@@ -48,22 +48,26 @@ Projection read_projection(const fs::path& path, const std::string& name) {
   throw ConfigError(path.string(), 0, "has no line " + name + ":");
 }
 
-/// Pictures 000000.png, 000001.png ... as far as they go; nothing may be missing in between.
+/// Pictures 000000.png (or .jpg), 000001.png ... as far as they go; nothing may be missing in between.
 std::vector<FrameFile> find_frames(const fs::path& folder, const std::vector<int64_t>& times_us) {
-  std::vector<FrameFile> frames;
-  std::error_code ignored;
-  std::size_t last = 0;
-  for (std::size_t i = 0; i < times_us.size(); ++i) {
-    const fs::path path = folder / fmt::format("{:06}.png", i);
-    if (!fs::exists(path, ignored)) continue;
-    if (i > 0 && (frames.empty() || last + 1 != i)) {
-      throw ConfigError((folder / fmt::format("{:06}.png", frames.empty() ? 0 : last + 1)).string(), 0, "no such file");
+  const auto find = [&](std::size_t i) -> std::optional<fs::path> {
+    std::error_code ignored;
+    for (const char* ending : {"png", "jpg"}) {
+      const fs::path path = folder / fmt::format("{:06}.{}", i, ending);
+      if (fs::exists(path, ignored)) return path;
     }
-    last = i;
-    frames.push_back({times_us[i], path});
+    return std::nullopt;
+  };
+  std::vector<FrameFile> frames;
+  for (std::size_t i = 0; i < times_us.size(); ++i) {
+    const auto path = find(i);
+    if (!path) continue;
+    if (frames.size() != i) {
+      throw ConfigError((folder / fmt::format("{:06}.png", frames.size())).string(), 0, "no such file");
+    }
+    frames.push_back({times_us[i], *path});
   }
-  const fs::path beyond = folder / fmt::format("{:06}.png", times_us.size());
-  if (fs::exists(beyond, ignored)) throw ConfigError(beyond.string(), 0, "has no time in times.txt");
+  if (const auto beyond = find(times_us.size())) throw ConfigError(beyond->string(), 0, "has no time in times.txt");
   return frames;
 }
 
