@@ -48,12 +48,12 @@ std::vector<PosePair> scored_pairs(const Reference& reference, const DriveFacts&
   return pairs;
 }
 
-void apply(const Similarity& S, std::vector<PosePair>& pairs) {
+void transform_estimates(const Similarity& S, std::vector<PosePair>& pairs) {
   for (PosePair& pair : pairs) pair.estimate = transformed(S, pair.estimate);
 }
 
 AlignedAte aligned_ate(std::vector<PosePair> pairs, Alignment alignment, const Similarity& S) {
-  apply(S, pairs);
+  transform_estimates(S, pairs);
   const auto errors = pose_errors(pairs, {.attitude = false, .velocity = false});
   AlignedAte out{alignment, ate_rmse(errors), ate_mean(errors), 0.0, S.scale};
   std::vector<double> horizontal;
@@ -116,6 +116,19 @@ std::optional<Similarity> chosen_similarity(const ChannelReport& report, const D
   if (report.alignment != Alignment::kTied) return align(report.scored, report.alignment);
   if (!kind.attitude || report.scored.empty()) return std::nullopt;
   return tie(tie_pair(report.scored, facts, options));
+}
+
+/// The scored pairs as the published covariance means them. An odometry's covariance grows from its own start, so it is
+/// tied to the reference there; the alignment over the whole drive would spread errors to where none are claimed.
+std::vector<PosePair> honest_pairs(const ChannelReport& report, const std::vector<PosePair>& unaligned,
+                                   const Reference& reference, const DriveFacts& facts, const EstimateInput& estimate,
+                                   const ReferenceKind& kind) {
+  if (!estimate.local_frame || estimate.scale_unknown || !kind.attitude) return report.scored;
+  const auto all = associate(estimate.trajectory, reference.trajectory, facts.reference.from_fixes);
+  if (all.empty()) return report.scored;
+  std::vector<PosePair> tied = unaligned;
+  transform_estimates(tie(all.front()), tied);
+  return tied;
 }
 
 void take_to_reference_point(EstimateInput& estimate) {
@@ -202,15 +215,19 @@ ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& fac
     if (S && !report.scored.empty()) report.ate_by_alignment.push_back(aligned_ate(report.scored, alignment, *S));
   }
   const auto S = chosen_similarity(report, facts, kind, options);
+  const std::vector<PosePair> unaligned = report.scored;
   if (!S) {
     report.scored.clear();  // an alignment that the data does not determine: nothing is scored, and pairs says so
   } else {
     report.similarity = *S;
-    apply(*S, report.scored);
+    transform_estimates(*S, report.scored);
   }
   measure_pairs(report, kind, options);
-  report.honesty = honesty(report.scored, kind, facts.reference.sigma_m);
-  report.sigmas = sigma_samples(report.scored, kind, facts.reference.sigma_m);
+  if (!report.scored.empty()) {
+    const auto honest = honest_pairs(report, unaligned, reference, facts, estimate, kind);
+    report.honesty = honesty(honest, kind, facts.reference.sigma_m);
+    report.sigmas = sigma_samples(honest, kind, facts.reference.sigma_m);
+  }
   align_in_place(estimate.trajectory, report.similarity, report.delay_s);
   measure_outages(report, reference, facts, estimate.trajectory, kind);
   report.path = thinned_path(estimate.trajectory);

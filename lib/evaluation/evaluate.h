@@ -82,7 +82,7 @@ struct ChannelReport {
   std::optional<double> tse_m;
   std::optional<Reconvergence> rct;
   std::optional<ModeAccuracy> modes;
-  Honesty honesty;
+  Honesty honesty;  ///< of an estimate in its own frame: tied to the reference at its start, whatever the alignment
   Availability availability;
   std::optional<Summary> latency;  ///< s
 

@@ -139,6 +139,26 @@ TEST_CASE("a tied odometry starts from the reference and shows its own drift fro
   CHECK(report.errors.front().position_frame.z() == Approx(-0.5));
 }
 
+TEST_CASE("an odometry's covariance is judged from its own start") {
+  // Error and sigma of the height grow by 1 cm a second from the start; alignment would centre the error instead.
+  const SE3 T{exp_q({0, 0, 1.0}), {50.0, 60.0, -7.0}};
+  auto estimate = estimate_of(changed(eight_trajectory(0.0, 200.0, 0.1), [&](Odometry& pose) {
+    const double grown = 1e-4 + 0.01 * seconds_between(0, pose.t_us);
+    pose.T_frame_vehicle.p.z() += grown;
+    pose.T_frame_vehicle = T * pose.T_frame_vehicle;
+    pose.cov_pose.diagonal() << 1e-6, 1e-6, grown * grown, 1e-8, 1e-8, 1e-8;
+  }));
+  estimate.local_frame = true;
+  const ChannelReport report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
+  CHECK(report.alignment == Alignment::kYaw);
+  CHECK(report.honesty.position.nees_per_dof == Approx(1.0 / 3.0).epsilon(0.02));
+  CHECK(report.honesty.position.within_3sigma == Approx(1.0));
+  estimate.local_frame = false;
+  EvaluationOptions aligned;
+  aligned.alignment = Alignment::kYaw;
+  CHECK(evaluate_channel(exact_reference(), exact_facts(), estimate, aligned).honesty.position.nees_per_dof > 100.0);
+}
+
 TEST_CASE("a constant latency of the reference is found where it is asked for") {
   Reference reference = exact_reference(1.0);
   for (Odometry& pose : reference.trajectory.poses) pose.t_us += 430'000;
