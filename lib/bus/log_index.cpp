@@ -11,20 +11,23 @@ int LogIndex::channel(const std::string& name) const {
   return found != channels.end() && *found == name ? static_cast<int>(found - channels.begin()) : -1;
 }
 
-LogIndex index_log(LogReader& reader, const std::function<bool(std::string_view channel)>& wanted) {
+LogIndex index_logs(const std::vector<LogReader*>& readers,
+                    const std::function<bool(std::string_view channel)>& wanted) {
   LogIndex index;
   std::map<std::string, int, std::less<>> numbers;  // -1: not wanted
-  reader.rewind();
-  while (const std::optional<LogEvent> event = reader.next()) {
-    auto found = numbers.find(event->channel);
-    if (found == numbers.end()) {
-      const int number = wanted(event->channel) ? static_cast<int>(index.channels.size()) : -1;
-      if (number >= 0) index.channels.emplace_back(event->channel);
-      found = numbers.emplace(event->channel, number).first;
+  for (std::size_t file = 0; file < readers.size(); ++file) {
+    readers[file]->rewind();
+    while (const std::optional<LogEvent> event = readers[file]->next()) {
+      auto found = numbers.find(event->channel);
+      if (found == numbers.end()) {
+        const int number = wanted(event->channel) ? static_cast<int>(index.channels.size()) : -1;
+        if (number >= 0) index.channels.emplace_back(event->channel);
+        found = numbers.emplace(event->channel, number).first;
+      }
+      if (found->second < 0) continue;
+      const Header header = read_header(event->data).value_or(Header{event->timestamp_us, 0, 0});
+      index.messages.push_back({header, found->second, static_cast<int>(file), event->offset});
     }
-    if (found->second < 0) continue;
-    const Header header = read_header(event->data).value_or(Header{event->timestamp_us, 0, 0});
-    index.messages.push_back({header, found->second, event->offset});
   }
   // Channels were numbered as they came; from here on in the order of their names.
   std::vector<std::string> sorted = index.channels;
@@ -36,8 +39,8 @@ LogIndex index_log(LogReader& reader, const std::function<bool(std::string_view 
   index.channels = std::move(sorted);
   for (IndexedMessage& message : index.messages) message.channel = number[static_cast<std::size_t>(message.channel)];
   std::sort(index.messages.begin(), index.messages.end(), [](const IndexedMessage& a, const IndexedMessage& b) {
-    return std::tie(a.header.utime, a.channel, a.header.run, a.header.seq, a.offset) <
-           std::tie(b.header.utime, b.channel, b.header.run, b.header.seq, b.offset);
+    return std::tie(a.header.utime, a.channel, a.header.run, a.header.seq, a.file, a.offset) <
+           std::tie(b.header.utime, b.channel, b.header.run, b.header.seq, b.file, b.offset);
   });
   return index;
 }

@@ -13,12 +13,13 @@ namespace roadfix {
 struct IndexedMessage {
   Header header;
   int channel = 0;  ///< index into LogIndex::channels
+  int file = 0;     ///< of the readers that were indexed
   uint64_t offset = 0;
 };
 
 struct LogIndex {
   std::vector<std::string> channels;  ///< sorted
-  /// In the order (utime, channel, run, seq, place in the file). A message too short for a header has the utime of its
+  /// In the order (utime, channel, run, seq, file, place in it). A message too short for a header has the utime of its
   /// event, run and seq 0.
   std::vector<IndexedMessage> messages;
 
@@ -26,7 +27,9 @@ struct LogIndex {
   [[nodiscard]] int channel(const std::string& name) const;
 };
 
-/// Reads every event's head, from the reader's beginning; damage is then known to the reader.
-LogIndex index_log(LogReader& reader, const std::function<bool(std::string_view channel)>& wanted);
+/// Reads every event's head, from each reader's beginning; damage is then known to the readers. Several readers: a
+/// recording that was split.
+LogIndex index_logs(const std::vector<LogReader*>& readers,
+                    const std::function<bool(std::string_view channel)>& wanted);
 
 }  // namespace roadfix

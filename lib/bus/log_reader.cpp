@@ -29,12 +29,13 @@ LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
       throw_log_error(path, "cannot map the log");
     }
     file_ = {static_cast<const uint8_t*>(mapped), size};
+    mapped_ = true;
   }
   ::close(fd);
 }
 
 LogReader::~LogReader() {
-  if (!file_.empty()) ::munmap(const_cast<uint8_t*>(file_.data()), file_.size());
+  if (mapped_) ::munmap(const_cast<uint8_t*>(file_.data()), file_.size());
 }
 
 std::optional<LogEvent> LogReader::next() {

@@ -20,6 +20,8 @@ class LogReader {
  public:
   /// Throws LogError where the file cannot be opened. An empty file is a log without events.
   explicit LogReader(const std::filesystem::path& path);
+  /// Over bytes in memory, which must outlive it; `name` is what path() says.
+  LogReader(std::span<const uint8_t> bytes, const std::string& name) : path_(name), file_(bytes) {}
   ~LogReader();
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
@@ -43,6 +45,7 @@ class LogReader {
 
   std::filesystem::path path_;
   std::span<const uint8_t> file_;
+  bool mapped_ = false;
   uint64_t position_ = 0;
   std::vector<LogDamage> damage_;
 };

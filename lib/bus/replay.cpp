@@ -64,7 +64,7 @@ Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path&
     if (options.timing) runners_.back()->measure_time();
     route(runners_.size() - 1);
   }
-  index_ = index_log(reader_, [&](std::string_view channel) {
+  index_ = index_logs({&reader_}, [&](std::string_view channel) {
     const std::string name(channel);
     const auto& copied = options_.copied_channels;
     return (routes_.contains(name) && !producers_.contains(name)) ||
@@ -73,15 +73,10 @@ Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path&
   for (const auto& runner : runners_) require_clock(*runner);
 }
 
-/// At one utime a stage gets its clocks last, the most preferred at the very end: what is as old as a clock sample is
-/// there before it, as the lateness promises.
 void Replayer::route(std::size_t stage) {
   const StageSpec& spec = runners_[stage]->spec();
   for (int input = 0; input < static_cast<int>(spec.inputs.size()); ++input) {
-    Route route{stage, input, 0};
-    for (std::size_t i = 0; i < spec.clocks.size(); ++i) {
-      if (spec.clocks[i].input == input) route.order = static_cast<int>(spec.clocks.size() - i);
-    }
+    const Route route{stage, input, delivery_order(spec, input)};
     routes_[spec.inputs[static_cast<std::size_t>(input)].channel].push_back(route);
   }
   for (const OutputSpec& output : spec.outputs) {

@@ -19,6 +19,13 @@ std::vector<std::string> handler_names(const StageSpec& spec) {
 
 }  // namespace
 
+int delivery_order(const StageSpec& spec, int input) {
+  for (std::size_t i = 0; i < spec.clocks.size(); ++i) {
+    if (spec.clocks[i].input == input) return static_cast<int>(spec.clocks.size() - i);
+  }
+  return 0;
+}
+
 StageRunner::StageRunner(std::unique_ptr<Stage> stage, MessageSink& sink)
     : stage_(std::move(stage)),
       sink_(sink),

@@ -78,6 +78,10 @@ class StageRunner : private Outputs {
   std::unique_ptr<HandlerTiming> timing_;
 };
 
+/// Where a message comes among those of one utime when a log is read in the order of utime: a stage gets its clocks
+/// last, the most preferred at the very end, so that what is as old as a clock sample is there before it.
+int delivery_order(const StageSpec& spec, int input);
+
 /// Data time between two snapshots. Together with the largest lateness and the feedback's delay it stays below the 10 s
 /// that a loss by the logger may cost.
 constexpr int64_t kSnapshot_us = 9'000'000;

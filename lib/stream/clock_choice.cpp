@@ -4,7 +4,7 @@
 
 namespace roadfix {
 
-ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<bool> changes) {
+ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<bool> may_tick) {
   int position = 0;
   while (position < static_cast<int>(clocks_.size()) && clocks_[static_cast<std::size_t>(position)].input != input) {
     ++position;
@@ -16,20 +16,15 @@ ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<
 
   const bool ahead = !utime_ || utime > *utime_;
   const bool preferred = active_ < 0 ? position == 0 : position <= active_;
-  bool ticks = false;
-  if (position == active_) {
-    ticks = ahead;
-  } else if (changes) {
-    ticks = ahead && *changes;
-  } else {
-    ticks = ahead && (preferred || may_take_over(position, utime));
-  }
-  if (ticks) {
-    changed_ = position != active_;
+  const bool takes = position == 0 || (position < active_) || may_take_over(position, utime);
+  if (ahead && may_tick.value_or(takes)) {
+    changed_ = position != active_ || rested_;
+    rested_ = false;
     active_ = position;
     utime_ = utime;
     return Verdict::kTick;
   }
+  if (ahead && position == active_) rested_ = true;
   return preferred && !ahead ? Verdict::kRefused : Verdict::kInput;
 }
 
@@ -47,6 +42,7 @@ std::optional<int> ClockChoice::active_input() const {
 
 void ClockChoice::restore(const State& state) {
   active_ = state.active;
+  rested_ = state.rested;
   utime_ = state.utime;
   first_utime_ = state.first_utime;
   newest_utime_ = state.newest_utime;

@@ -1,5 +1,6 @@
 /// Which channel drives a stage's time. The first of the list that is not silent; time-outs are in data time, so a
-/// silence shows only when another clock channel goes on.
+/// silence shows only when another clock channel goes on. When a preferred clock comes back, the one that stood in for
+/// it rests, so that the preferred one can get ahead of it.
 #pragma once
 
 #include <cstdint>
@@ -20,21 +21,22 @@ class ClockChoice {
     kRefused  ///< older than the clock; it can no longer be taken in order
   };
 
-  /// A sample of `input`. `changes` overrides the time-outs: a recorded ledger knows where the clock changed.
-  Verdict offer(int input, int64_t utime, std::optional<bool> changes = std::nullopt);
+  /// A sample of `input`. `may_tick` overrides the time-outs: a recorded ledger knows what ticked.
+  Verdict offer(int input, int64_t utime, std::optional<bool> may_tick = std::nullopt);
 
-  /// Whether the last kTick came from another channel than the tick before it (the first tick counts).
+  /// Whether the last kTick came from another channel than the tick before it, or after a rest (the first tick counts).
   [[nodiscard]] bool changed() const { return changed_; }
   [[nodiscard]] std::optional<int64_t> utime() const { return utime_; }
   [[nodiscard]] std::optional<int> active_input() const;
 
   struct State {
     int active = -1;
+    bool rested = false;
     std::optional<int64_t> utime;
     std::optional<int64_t> first_utime;
     std::vector<std::optional<int64_t>> newest_utime;
   };
-  [[nodiscard]] State state() const { return {active_, utime_, first_utime_, newest_utime_}; }
+  [[nodiscard]] State state() const { return {active_, rested_, utime_, first_utime_, newest_utime_}; }
   void restore(const State& state);
 
  private:
@@ -43,6 +45,7 @@ class ClockChoice {
   std::vector<ClockSpec> clocks_;
   int active_ = -1;
   bool changed_ = false;
+  bool rested_ = false;  // the active clock passed over a sample since its last tick
   std::optional<int64_t> utime_;
   std::optional<int64_t> first_utime_;  // of any clock channel: until its time-out after it, the first clock may begin
   std::vector<std::optional<int64_t>> newest_utime_;

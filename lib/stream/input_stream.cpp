@@ -45,18 +45,23 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
   const InputSpec& spec = inputs_[static_cast<std::size_t>(input)];
   const int64_t effect_utime = id.utime + spec.effect_delay_us;
   if (horizon_ && effect_utime <= *horizon_) {
+    settle_late(input, id);
     return refuse(input, id, spec.effect_delay_us > 0 ? LedgerKind::kUnusedFeedback : LedgerKind::kLate);
   }
-  std::optional<bool> changes;
-  if (precedent_ != nullptr) changes = precedent_->changes_clock(input, id);
-  const ClockChoice::Verdict verdict = clock_.offer(input, id.utime, changes);
+  std::optional<bool> may_tick;
+  if (precedent_ != nullptr) {
+    may_tick =
+        precedent_->changes_clock(input, id) || (clock_.active_input() == input && !precedent_->clock_rests(id.utime));
+  }
+  const std::optional<int64_t> last_utime = clock_.utime();
+  const ClockChoice::Verdict verdict = clock_.offer(input, id.utime, may_tick);
   if (verdict == ClockChoice::Verdict::kRefused) return refuse(input, id, LedgerKind::kRefused);
   if (!waiting_.insert(effect_utime, input, id, bytes)) {
     ++track.counters.duplicate;
     return Offer::kDuplicate;
   }
   if (verdict == ClockChoice::Verdict::kTick) {
-    tick(input, id);
+    tick(input, id, last_utime);
     return Offer::kTick;
   }
   limit_waiting();
@@ -76,6 +81,16 @@ InputStream::Standing InputStream::standing(int input, const EventId& id) const 
   return id.utime > track.newest_settled_utime ? Standing::kConflict : Standing::kDuplicate;
 }
 
+/// What comes before a late message and is not here would be late as well: it is given up now, not only when a later
+/// one is applied.
+void InputStream::settle_late(int input, const EventId& id) {
+  InputTrack& track = track_of(input);
+  if (!track.settled || track.settled->run != id.run) return;
+  if (id.seq > track.settled->seq + 1) note_lost(input, id.run, track.settled->seq + 1, id.seq - 1);
+  track.settled->seq = id.seq;
+  track.newest_settled_utime = std::max(track.newest_settled_utime, id.utime);
+}
+
 Offer InputStream::refuse(int input, const EventId& id, LedgerKind kind) {
   InputCounters& counters = track_of(input).counters;
   if (kind == LedgerKind::kRefused) {
@@ -87,8 +102,11 @@ Offer InputStream::refuse(int input, const EventId& id, LedgerKind kind) {
   return kind == LedgerKind::kRefused ? Offer::kRefused : Offer::kLate;
 }
 
-void InputStream::tick(int input, const EventId& id) {
-  if (clock_.changed()) ledger_.note(LedgerKind::kClockChanged, input, id.run, id.seq, id.seq, id.utime);
+/// A change of clock is entered with the utime of the tick before it: between the two nothing ticked.
+void InputStream::tick(int input, const EventId& id, std::optional<int64_t> last_utime) {
+  if (clock_.changed()) {
+    ledger_.note(LedgerKind::kClockChanged, input, id.run, id.seq, id.seq, last_utime.value_or(0));
+  }
   if (!run_) run_ = id.utime;
   settle_tick(input, id);
   ticks_ahead_.push_back({input, id});

@@ -29,6 +29,8 @@ class Precedent {
   virtual ~Precedent() = default;
   [[nodiscard]] virtual bool accepts(int input, const EventId& id) const = 0;
   [[nodiscard]] virtual bool changes_clock(int input, const EventId& id) const = 0;
+  /// Whether the active clock's sample of this utime was passed over, for a preferred one that had come back.
+  [[nodiscard]] virtual bool clock_rests(int64_t utime) const = 0;
   /// Entries up to and with this clock sample.
   [[nodiscard]] virtual int64_t entries_at(int64_t clock_utime) const = 0;
 };
@@ -91,10 +93,11 @@ class InputStream {
   [[nodiscard]] Standing standing(int input, const EventId& id) const;
   [[nodiscard]] bool resumed_tick(int input, const EventId& id) const;
   Offer refuse(int input, const EventId& id, LedgerKind kind);
-  void tick(int input, const EventId& id);
+  void tick(int input, const EventId& id, std::optional<int64_t> last_utime);
   void settle_tick(int input, const EventId& id);
   bool admit(const WaitingInput& waiting);
   void settle(int input, const EventId& id);
+  void settle_late(int input, const EventId& id);
   void note_lost(int input, int64_t run, int64_t first_seq, int64_t last_seq);
   void limit_waiting();
   InputTrack& track_of(int input) { return tracks_[static_cast<std::size_t>(input)]; }

@@ -62,6 +62,7 @@ void InputStream::save(StateWriter& writer) const {
   for (const InputTrack& track : tracks_) put_track(writer, track);
   const ClockChoice::State clock = clock_.state();
   writer.put(static_cast<int64_t>(clock.active));
+  writer.put(static_cast<int8_t>(clock.rested));
   put(writer, clock.utime);
   put(writer, clock.first_utime);
   writer.put(static_cast<int64_t>(clock.newest_utime.size()));
@@ -85,6 +86,7 @@ void InputStream::load(StateReader& reader) {
   for (InputTrack& track : tracks_) get_track(reader, track);
   ClockChoice::State clock;
   clock.active = static_cast<int>(get_count(reader, static_cast<int64_t>(inputs_.size())));
+  clock.rested = reader.get<int8_t>() != 0;
   clock.utime = get_optional(reader);
   clock.first_utime = get_optional(reader);
   const int64_t clocks = get_count(reader, kMaxCount);

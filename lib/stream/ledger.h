@@ -27,7 +27,7 @@ struct LedgerEntry {
   int64_t run = 0;
   int64_t first_seq = 0;
   int64_t last_seq = 0;
-  int64_t utime = 0;  ///< of first_seq where known
+  int64_t utime = 0;  ///< of first_seq where known; of kClockChanged: of the tick before it
 };
 
 /// What happens between two clock samples is noted, and entered with the next: so the number of entries behind an

@@ -21,9 +21,11 @@ int main(int argc, char** argv) {
   roadfix::add_evaluate_command(app);
   roadfix::add_export_command(app);
   roadfix::add_import_command(app);
+  roadfix::add_log_command(app);
   roadfix::add_replay_command(app);
   roadfix::add_run_command(app);
   roadfix::add_simulate_command(app);
+  roadfix::add_verify_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

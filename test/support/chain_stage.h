@@ -16,7 +16,7 @@ namespace roadfix::test {
 /// clock samples ahead of it.
 class ChainStage : public Stage {
  public:
-  explicit ChainStage(StageSpec spec) : spec_(std::move(spec)) {}
+  explicit ChainStage(StageSpec spec, double factor = 0.99) : spec_(std::move(spec)), factor_(factor) {}
 
   const StageSpec& spec() const override { return spec_; }
 
@@ -56,10 +56,10 @@ class ChainStage : public Stage {
     ahead_.clear();
   }
 
-  std::string effective_config() const override { return "factor: 0.99\n"; }
+  std::string effective_config() const override { return "factor: " + std::to_string(factor_).substr(0, 4) + "\n"; }
 
  private:
-  static double step(double state, double value) { return 0.99 * state + value; }
+  double step(double state, double value) const { return factor_ * state + value; }
 
   double value_of(const Message& message) const {
     const std::string& type = spec_.inputs[static_cast<std::size_t>(message.input)].type;
@@ -70,6 +70,7 @@ class ChainStage : public Stage {
   }
 
   StageSpec spec_;
+  double factor_;
   double state_ = 0.0;
   int64_t state_utime_ = 0;
   int64_t published_ = 0;

@@ -36,8 +36,21 @@ TEST_CASE("a silent clock is followed by the next after its time-out, and comes 
   REQUIRE(clock.active_input() == kVo);
   REQUIRE(clock.offer(kWheel, 1200) == Verdict::kInput);  // the camera is alive
   REQUIRE(clock.offer(kIns, 1090) == Verdict::kRefused);  // preferred, but behind the clock
+  REQUIRE(clock.offer(kVo, 1105) == Verdict::kInput);     // which rests now for it to get ahead
   REQUIRE(clock.offer(kIns, 1110) == Verdict::kTick);
   REQUIRE(clock.active_input() == kIns);
+}
+
+TEST_CASE("a clock that rested for one that did not come back goes on after the time-out, as a change") {
+  ClockChoice clock = three_clocks();
+  clock.offer(kIns, 1000);
+  clock.offer(kVo, 1101);
+  clock.offer(kIns, 1095);
+  REQUIRE(clock.offer(kVo, 1150) == Verdict::kInput);
+  REQUIRE(clock.offer(kVo, 1196) == Verdict::kTick);
+  REQUIRE(clock.changed());
+  REQUIRE(clock.offer(kVo, 1200) == Verdict::kTick);
+  REQUIRE_FALSE(clock.changed());
 }
 
 TEST_CASE("the third clock waits for both before it") {
@@ -60,13 +73,14 @@ TEST_CASE("at the start the first clock has its time-out to appear in") {
   REQUIRE(without.offer(kVo, 1101) == Verdict::kTick);
 }
 
-TEST_CASE("a recorded change replaces the time-outs") {
+TEST_CASE("what a record says replaces the time-outs") {
   ClockChoice clock = three_clocks();
   REQUIRE(clock.offer(kIns, 900, false) == Verdict::kInput);
   REQUIRE(clock.offer(kIns, 1000, true) == Verdict::kTick);
   REQUIRE(clock.offer(kVo, 5000, false) == Verdict::kInput);
-  REQUIRE(clock.offer(kIns, 1010, false) == Verdict::kTick);  // the active clock needs no entry
+  REQUIRE(clock.offer(kIns, 1010, true) == Verdict::kTick);
   REQUIRE(clock.offer(kWheel, 1011, true) == Verdict::kTick);
+  REQUIRE(clock.offer(kWheel, 1012, false) == Verdict::kInput);
 }
 
 TEST_CASE("a restored choice goes on as the saved one") {

@@ -1,0 +1,145 @@
+// roadfix log info|check|cut|filter|repair: what is in a log, and copies of parts of it.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <regex>
+
+#include "bus/log_survey.h"
+#include "bus/log_writer.h"
+#include "bus/message.h"
+#include "roadfix/commands.h"
+
+namespace roadfix {
+
+namespace {
+
+struct LogArguments {
+  std::string in;
+  std::string out;
+  double from_s = 0.0;
+  double to_s = 1e9;
+  std::string channels = ".*";
+  bool invert = false;
+};
+
+void print_damage(const LogArguments& arguments, const std::vector<LogDamage>& damage) {
+  for (const LogDamage& d : damage) {
+    std::cerr << fmt::format("roadfix: {}: byte {}: {} bytes hold no intact event: {}\n", arguments.in, d.offset,
+                             d.bytes, d.what);
+  }
+}
+
+void print_info(const LogArguments& arguments) {
+  LogReader reader(arguments.in);
+  const LogSurvey survey = survey_log(reader);
+  std::cout << fmt::format("{}: {} events, {} bytes\n", arguments.in, survey.events, reader.size_bytes());
+  std::cout << fmt::format("{:<24} {:<16} {:>9} {:>9} {:>12} {:>9} {:>5}\n", "channel", "type", "events", "rate Hz",
+                           "bytes", "span s", "runs");
+  for (const auto& [name, channel] : survey.channels) {
+    std::cout << fmt::format("{:<24} {:<16} {:>9} {:>9.2f} {:>12} {:>9.2f} {:>5}\n", name, channel.type, channel.events,
+                             channel.rate_hz(), channel.bytes,
+                             static_cast<double>(channel.last_utime - channel.first_utime) * 1e-6, channel.runs.size());
+  }
+  print_damage(arguments, survey.damage);
+}
+
+/// Ends with status 1 where anything is broken or missing.
+void check_log(const LogArguments& arguments) {
+  LogReader reader(arguments.in);
+  const LogSurvey survey = survey_log(reader);
+  print_damage(arguments, survey.damage);
+  bool whole = survey.damage.empty();
+  for (const auto& [name, channel] : survey.channels) {
+    if (channel.undecodable + channel.missing + channel.repeated == 0) continue;
+    whole = whole && channel.undecodable + channel.missing == 0;
+    std::cout << fmt::format("{}: {} undecodable, {} missing by seq, {} repeated\n", name, channel.undecodable,
+                             channel.missing, channel.repeated);
+  }
+  if (survey.backward_stamps > 0) {
+    std::cout << fmt::format("{} events are stamped earlier than the one before; harmless\n", survey.backward_stamps);
+  }
+  std::cout << fmt::format("{}: {} events, {}\n", arguments.in, survey.events, whole ? "whole" : "not whole");
+  if (!whole) throw CLI::RuntimeError(1);
+}
+
+/// Copies the events that `wanted` takes; their stamps stay.
+template <class Wanted>
+void copy_log(const LogArguments& arguments, const Wanted& wanted) {
+  if (std::error_code ignored; std::filesystem::equivalent(arguments.in, arguments.out, ignored)) {
+    throw std::runtime_error(arguments.out + ": the output would replace the input");
+  }
+  LogReader reader(arguments.in);
+  LogWriter writer(arguments.out);
+  int64_t events = 0;
+  while (const std::optional<LogEvent> event = reader.next()) {
+    ++events;
+    if (wanted(*event)) writer.write(event->channel, event->timestamp_us, event->data);
+  }
+  const int64_t written = writer.events();
+  writer.commit();
+  print_damage(arguments, reader.damage());
+  std::cout << fmt::format("{}: {} of {} events\n", arguments.out, written, events);
+}
+
+/// By the messages' own time, where they have one; in seconds after the earliest.
+void cut_log(const LogArguments& arguments) {
+  const auto time_of = [](const LogEvent& event) {
+    const std::optional<Header> header = read_header(event.data);
+    // A message of another origin has no utime at that place: an hour from its stamp is no utime.
+    constexpr int64_t kPlausible_us = 3'600'000'000;
+    const bool ours = header && std::abs(header->utime - event.timestamp_us) < kPlausible_us;
+    return ours ? header->utime : event.timestamp_us;
+  };
+  int64_t first_us = std::numeric_limits<int64_t>::max();
+  LogReader reader(arguments.in);
+  while (const std::optional<LogEvent> event = reader.next()) first_us = std::min(first_us, time_of(*event));
+  copy_log(arguments, [&](const LogEvent& event) {
+    const double after_s = static_cast<double>(time_of(event) - first_us) * 1e-6;
+    return after_s >= arguments.from_s && after_s < arguments.to_s;
+  });
+}
+
+void filter_log(const LogArguments& arguments) {
+  std::regex channels;
+  try {
+    channels = std::regex(arguments.channels);
+  } catch (const std::regex_error& e) {
+    throw std::runtime_error("--channels '" + arguments.channels + "': " + e.what());
+  }
+  copy_log(arguments, [&](const LogEvent& event) {
+    return std::regex_match(event.channel.begin(), event.channel.end(), channels) != arguments.invert;
+  });
+}
+
+}  // namespace
+
+void add_log_command(CLI::App& app) {
+  const auto arguments = std::make_shared<LogArguments>();
+  CLI::App* log = app.add_subcommand("log", "Look at logs, cut, filter and repair them");
+  log->require_subcommand(1);
+  const auto add = [&](const std::string& name, const std::string& what, bool writes) {
+    CLI::App* command = log->add_subcommand(name, what);
+    command->add_option("IN", arguments->in, "Log")->required();
+    if (writes) command->add_option("--out", arguments->out, "Log to write")->required();
+    return command;
+  };
+  add("info", "Channels, types, rates", false)->callback([arguments] { print_info(*arguments); });
+  add("check", "Damage, broken messages, gaps; exit status 1 where there is any", false)->callback([arguments] {
+    check_log(*arguments);
+  });
+  add("repair", "Copy all intact events", true)->callback([arguments] {
+    copy_log(*arguments, [](const LogEvent&) { return true; });
+  });
+  CLI::App* cut = add("cut", "Copy a stretch of time", true);
+  cut->add_option("--from-s", arguments->from_s, "Seconds after the first message");
+  cut->add_option("--to-s", arguments->to_s, "Seconds after the first message, exclusive");
+  cut->callback([arguments] { cut_log(*arguments); });
+  CLI::App* filter = add("filter", "Copy some channels", true);
+  filter->add_option("--channels", arguments->channels, "Regular expression over the whole name")->required();
+  filter->add_flag("--invert", arguments->invert, "All but these");
+  filter->callback([arguments] { filter_log(*arguments); });
+}
+
+}  // namespace roadfix

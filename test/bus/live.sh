@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Three stages on real UDP in a network namespace of their own, recorded by lcm-logger, then verified: nothing may differ.
+#   live.sh BIN clean|starved|killed|late_recording
+set -euo pipefail
+bin=$1; trouble=$2
+if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
+  command -v lcm-logger >/dev/null || { echo "skipped: no lcm-logger"; exit 0; }
+  unshare -n true 2>/dev/null || { echo "skipped: no right to make a network namespace"; exit 0; }
+  exec env ROADFIX_IN_NAMESPACE=1 unshare -n "$0" "$@"
+fi
+ip link set lo up && ip route add 224.0.0.0/4 dev lo
+folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null; rm -rf "$folder"' EXIT
+url='udpm://239.255.76.67:7667?ttl=0'
+starved_url=$url; [[ $trouble == starved ]] && starved_url+='&recv_buf_size=2500'
+declare -A stage
+start() { "$bin/chain_process" --config "/$1" --bus "${2:-$url}" 2>>"$folder/stages.err" & stage[$1]=$!; }
+
+record() { lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/null 2>&1 & logger=$!; }
+[[ $trouble == late_recording ]] || record
+for name in odometry fusion; do start $name; done
+start filter "$starved_url"
+sleep 1
+"$bin/play_drive" "$url" 24 & player=$!
+case $trouble in
+  starved) for _ in 1 2 3 4; do sleep 3; kill -STOP "${stage[filter]}"; sleep 1; kill -CONT "${stage[filter]}"; done ;;
+  killed) sleep 8.3; kill -KILL "${stage[filter]}"; wait "${stage[filter]}" 2>/dev/null || true; sleep 1.5; start filter ;;
+  late_recording) sleep 3; record ;;
+esac
+wait $player
+sleep 0.5
+for pid in "${stage[@]}"; do kill -INT "$pid"; done
+for pid in "${stage[@]}"; do wait "$pid" || { echo "a stage ended with $?"; cat "$folder/stages.err"; exit 1; }; done
+sleep 0.5; kill -INT $logger; wait $logger || true
+grep -v 'bytes; large messages may be lost\|receive buffer\|LCM' "$folder/stages.err" || true
+"$bin/verify_chain" "$folder/drive.lcm" | tee "$folder/verdict"
+read -r _ identical _ differing _ unverifiable < <(tail -n 1 "$folder/verdict")
+case $trouble in
+  late_recording) [[ $identical -gt 2000 ]] ;;
+  *) [[ $identical -gt 5500 && $unverifiable -eq 0 ]] ;;
+esac
+[[ $differing -eq 0 ]]
