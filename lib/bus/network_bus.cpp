@@ -106,7 +106,6 @@ void NetworkBus::drain() {
 
 bool NetworkBus::handle(std::chrono::milliseconds patience) {
   if (queue_.empty()) lcm_->handleTimeout(static_cast<int>(patience.count()));
-  drain();
   for (int i = 0; i < kHandleAtOnce && !queue_.empty(); ++i) {
     Waiting message = std::move(queue_.front());
     queue_.pop_front();

@@ -68,6 +68,7 @@ class StageRunner : private Outputs {
   std::string ledger_channel_;
   int64_t next_ledger_seq_ = 0;
   int64_t ledger_published_ = 0;
+  int64_t ledger_utime_ = 0;
   std::string state_channel_;
   int64_t next_state_seq_ = 0;
   std::optional<int64_t> state_slot_;

@@ -12,6 +12,9 @@ namespace {
 /// Of the bytes in state_t::state that are the runner's; the stage's own layout is in the message.
 constexpr int64_t kRunnerLayout = 1;
 
+/// Data time after which the entries of the last minute are published again.
+constexpr int64_t kRepeatLedger_us = 5'000'000;
+
 }  // namespace
 
 std::string stage_channel(const std::string& prefix, const std::string& stage_name) {
@@ -20,10 +23,12 @@ std::string stage_channel(const std::string& prefix, const std::string& stage_na
   return channel;
 }
 
-/// Before the outputs that the new entries affect.
+/// Before the outputs that the new entries affect; and again now and then, so that a logger may lose one.
 void StageRunner::publish_ledger() {
-  if (stream_.ledger().total() == ledger_published_) return;
+  const bool again = !stream_.ledger().recent().empty() && now_utime_ >= ledger_utime_ + kRepeatLedger_us;
+  if (stream_.ledger().total() == ledger_published_ && !again) return;
   ledger_published_ = stream_.ledger().total();
+  ledger_utime_ = now_utime_;
   ledger_t ledger{};
   ledger.utime = now_utime_;
   ledger.run = *stream_.run();
@@ -56,7 +61,7 @@ void StageRunner::publish_state() {
   stream_.save(writer);
   writer.put(static_cast<int64_t>(next_seq_.size()));
   for (const int64_t seq : next_seq_) writer.put(seq);
-  for (const int64_t value : {next_ledger_seq_, ledger_published_, next_state_seq_, *state_slot_}) writer.put(value);
+  for (const int64_t value : {next_state_seq_, *state_slot_}) writer.put(value);
   writer.put(std::span<const uint8_t>(stage_->save()));
   state_t state{};
   state.utime = now_utime_;
@@ -83,13 +88,14 @@ void StageRunner::resume(const state_t& state) {
     throw std::runtime_error("state: of a stage with other outputs");
   }
   for (int64_t& seq : next_seq_) reader.get(seq);
-  for (int64_t* value : {&next_ledger_seq_, &ledger_published_, &next_state_seq_}) reader.get(*value);
+  next_state_seq_ = reader.get<int64_t>();
   ++next_state_seq_;
   state_slot_ = reader.get<int64_t>();
   std::vector<uint8_t> stage_state;
   reader.get(stage_state);
   reader.finish();
   stage_->load(stage_state);
+  ledger_published_ = stream_.ledger().total();
 }
 
 config_t StageRunner::config_message() const {

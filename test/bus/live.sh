@@ -9,7 +9,7 @@ if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
   exec env ROADFIX_IN_NAMESPACE=1 unshare -n "$0" "$@"
 fi
 ip link set lo up && ip route add 224.0.0.0/4 dev lo
-folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null; rm -rf "$folder"' EXIT
+folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$folder"' EXIT
 url='udpm://239.255.76.67:7667?ttl=0'
 starved_url=$url; [[ $trouble == starved ]] && starved_url+='&recv_buf_size=2500'
 declare -A stage
@@ -34,8 +34,10 @@ sleep 0.5; kill -INT $logger; wait $logger || true
 grep -v 'bytes; large messages may be lost\|receive buffer\|LCM' "$folder/stages.err" || true
 "$bin/verify_chain" "$folder/drive.lcm" | tee "$folder/verdict"
 read -r _ identical _ differing _ unverifiable < <(tail -n 1 "$folder/verdict")
-case $trouble in
-  late_recording) [[ $identical -gt 2000 ]] ;;
-  *) [[ $identical -gt 5500 && $unverifiable -eq 0 ]] ;;
-esac
-[[ $differing -eq 0 ]]
+fail() { echo "live $trouble: $*"; exit 1; }
+[[ $differing -eq 0 ]] || fail 'something differs'
+[[ $identical -gt 2000 ]] || fail 'too little was verified'
+# On a busy machine lcm-logger itself loses messages; without that, and from the beginning, everything can be verified.
+if ! grep -q 'lost by the logger' "$folder/verdict" && [[ $trouble != late_recording ]]; then
+  [[ $unverifiable -eq 0 ]] || fail 'unverifiable, but the logger lost nothing'
+fi

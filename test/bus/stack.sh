@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# The shipped stages live on the demo drive, played by lcm-logplayer, recorded by lcm-logger, then verified.
+# Prints the lines of roadfix verify; fails where anything differs.
+#   stack.sh BIN CONFIG LOG [SECONDS]
+set -euo pipefail
+bin=$1; config=$(realpath "$2"); log=$(realpath "$3"); seconds=${4:-20}
+if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
+  command -v lcm-logger >/dev/null || { echo "skipped: no lcm-logger"; exit 0; }
+  unshare -n true 2>/dev/null || { echo "skipped: no right to make a network namespace"; exit 0; }
+  exec env ROADFIX_IN_NAMESPACE=1 unshare -n "$0" "$@"
+fi
+ip link set lo up && ip route add 224.0.0.0/4 dev lo
+folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$folder"' EXIT
+url='udpm://239.255.76.67:7667?ttl=0'
+"$bin/roadfix" log cut "$log" --to-s "$seconds" --out "$folder/cut.lcm" >/dev/null
+lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/null 2>&1 & logger=$!
+stages=()
+for name in wheel_odometry gnss_ins_ekf; do
+  "$bin/$name" --config "$config" --bus "$url" 2>>"$folder/stages.err" & stages+=($!)
+done
+sleep 1
+lcm-logplayer --lcm-url="$url" "$folder/cut.lcm" >/dev/null 2>&1
+sleep 0.5
+for pid in "${stages[@]}"; do kill -INT "$pid"; done
+for pid in "${stages[@]}"; do wait "$pid" || { echo "a stage ended with $?"; cat "$folder/stages.err"; exit 1; }; done
+sleep 0.5; kill -INT $logger; wait $logger || true
+"$bin/roadfix" verify "$folder/drive.lcm" --config "$config"
