@@ -6,29 +6,29 @@
 
 namespace roadfix {
 
-/// Motion at the state's epoch that the measurements need and the state does not hold.
-struct Motion {
+/// BodyMotion at the state's epoch that the measurements need and the state does not hold.
+struct BodyMotion {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< rad/s against the Earth, imu axes
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s2, dv/dt, enu axes
 };
 
 /// Antenna position z (m, enu) valid `ahead` seconds after the state's epoch (with the state's own latency and offset).
-Measurement<3> gnss_position(const NavState& x, const Motion& motion, const Eigen::Vector3d& z,
+Measurement<3> gnss_position(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& z,
                              const Eigen::Matrix3d& cov, double ahead, const Eigen::Vector3d& p_imu_antenna);
 
 /// Antenna velocity z (m/s, enu).
-Measurement<3> gnss_velocity(const NavState& x, const Motion& motion, const Eigen::Vector3d& z,
+Measurement<3> gnss_velocity(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& z,
                              const Eigen::Matrix3d& cov, double ahead, const Eigen::Vector3d& p_imu_antenna);
 
 /// Yaw of the vehicle's x axis (rad, counterclockwise from east).
 Measurement<1> vehicle_yaw(const NavState& x, double yaw, double sigma);
 
 /// Forward speed of the vehicle (m/s, signed) by its wheels.
-Measurement<1> wheel_speed(const NavState& x, const Motion& motion, double speed, double sigma, double ahead,
+Measurement<1> wheel_speed(const NavState& x, const BodyMotion& motion, double speed, double sigma, double ahead,
                            const Eigen::Vector3d& p_imu_vehicle);
 
 /// Sideways and vertical speed of the vehicle at its point without sideslip: zero. R is the caller's.
-Measurement<2> no_sideslip(const NavState& x, const Motion& motion, const Eigen::Vector3d& p_imu_vehicle);
+Measurement<2> no_sideslip(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& p_imu_vehicle);
 
 /// Standing: velocity zero.
 Measurement<3> zero_velocity(const NavState& x, double sigma);

@@ -10,13 +10,13 @@ struct AntennaMotion {
   Eigen::Matrix3d R;
   Eigen::Vector3d turning;   // R (rate x lever)
   Eigen::Vector3d velocity;  // v + turning
-  AntennaMotion(const NavState& x, const Motion& m, const Eigen::Vector3d& lever)
+  AntennaMotion(const NavState& x, const BodyMotion& m, const Eigen::Vector3d& lever)
       : R(x.q_enu_imu.toRotationMatrix()), turning(R * m.rate.cross(lever)), velocity(x.velocity + turning) {}
 };
 
 }  // namespace
 
-Measurement<3> gnss_position(const NavState& x, const Motion& motion, const Eigen::Vector3d& z,
+Measurement<3> gnss_position(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& z,
                              const Eigen::Matrix3d& cov, double ahead, const Eigen::Vector3d& lever) {
   const AntennaMotion antenna(x, motion, lever);
   const Eigen::Vector3d arm = antenna.R * lever;
@@ -33,7 +33,7 @@ Measurement<3> gnss_position(const NavState& x, const Motion& motion, const Eige
   return m;
 }
 
-Measurement<3> gnss_velocity(const NavState& x, const Motion& motion, const Eigen::Vector3d& z,
+Measurement<3> gnss_velocity(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& z,
                              const Eigen::Matrix3d& cov, double ahead, const Eigen::Vector3d& lever) {
   const AntennaMotion antenna(x, motion, lever);
   Measurement<3> m;

@@ -12,7 +12,7 @@ struct VehicleVelocity {
   Eigen::Vector3d rate;  // of the vehicle, vehicle axes
   Eigen::Matrix<double, 3, 2> rate_mounting;
 
-  VehicleVelocity(const NavState& x, const Motion& motion, double ahead, const Eigen::Vector3d& lever) {
+  VehicleVelocity(const NavState& x, const BodyMotion& motion, double ahead, const Eigen::Vector3d& lever) {
     const Eigen::Matrix3d R = x.q_enu_imu.toRotationMatrix();
     const Eigen::Matrix3d to_vehicle = x.R_imu_vehicle().transpose();
     const Eigen::Vector3d v = x.velocity + ahead * motion.acceleration;
@@ -29,7 +29,7 @@ struct VehicleVelocity {
 
 }  // namespace
 
-Measurement<1> wheel_speed(const NavState& x, const Motion& motion, double speed, double sigma, double ahead,
+Measurement<1> wheel_speed(const NavState& x, const BodyMotion& motion, double speed, double sigma, double ahead,
                            const Eigen::Vector3d& p_imu_vehicle) {
   const VehicleVelocity v(x, motion, ahead, p_imu_vehicle);
   const double gain = 1.0 / (1.0 + x.wheel_scale);
@@ -41,7 +41,7 @@ Measurement<1> wheel_speed(const NavState& x, const Motion& motion, double speed
   return m;
 }
 
-Measurement<2> no_sideslip(const NavState& x, const Motion& motion, const Eigen::Vector3d& p_imu_vehicle) {
+Measurement<2> no_sideslip(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& p_imu_vehicle) {
   const VehicleVelocity v(x, motion, 0.0, p_imu_vehicle);
   // At x behind the origin: v + rate x (-x, 0, 0), (M.29).
   const double behind = x.no_slip_x;

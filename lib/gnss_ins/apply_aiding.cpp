@@ -100,7 +100,7 @@ AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& n
   const NavState& x = core.state();
   const Measurement<2> both = no_sideslip(x, core.motion(), config_.vehicle.p_imu_vehicle);
   // Tyres slip with the lateral acceleration, springs give with any.
-  const Motion& motion = core.motion();
+  const BodyMotion& motion = core.motion();
   const double acceleration = axis == 0 ? x.velocity.norm() * motion.rate.z() : motion.acceleration.head<2>().norm();
   const double sigma = noise.sigma(acceleration);
   Measurement<1> m;

@@ -65,13 +65,13 @@ struct AidingConfig {
 
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
-  double start_std = 0.1;       ///< m/s, before anything is learnt
+  double start_std = 0.05;      ///< m/s, before anything is learnt
   double min_std = 0.003;       ///< m/s
   double max_std = 0.5;         ///< m/s
   double doubling_accel = 1.0;  ///< m/s2 of lateral acceleration that doubles it
   double prior_count = 5.0;     ///< residuals that the start counts for
   double memory_count = 400.0;  ///< residuals
-  double confidence = 3.0;      ///< sigmas of the learnt variance that are added to it
+  double confidence = 2.0;      ///< sigmas of the learnt variance that are added to it
   double min_speed = 2.0;       ///< m/s, to learn
 };
 

@@ -12,7 +12,9 @@ namespace {
 constexpr double kMaxLag = 1.5;         // s behind the horizon, for receivers that stamp late
 constexpr double kBridgeAccel = 2.0;    // m/s2, what a car may do unseen in a gap of the IMU
 constexpr double kSideslipShown = 3.0;  // s since the last position, to learn the car's sideslip
-constexpr double kBridgeRate = 0.3;     // rad/s
+constexpr int64_t kDueEarly = 20'000;   // us, so that an interval of whole wheel periods is not missed by jitter
+constexpr double kWheelsSilent = 0.3;   // s without a wheel speed, after which the constraint keeps its own time
+constexpr double kBridgeRate = 0.1;     // rad/s
 
 bool plausible(const ImuSample& s, const PropagationConfig& c) {
   return s.gyro.allFinite() && s.accel.allFinite() && s.gyro.norm() < c.max_gyro && s.accel.norm() < c.max_accel;
@@ -156,7 +158,11 @@ void GnssIns::step(const ImuSample& imu) {
   const bool gap = dt > c.max_gap;
   const bool block_done = !gap && monitor_.add(imu, dt);
   ImuNoise noise = monitor_.noise();
-  if (gap) ++gaps_;
+  if (gap) {
+    ++gaps_;
+    // What was measured inside the gap is of a time that the state skips.
+    pending_.drop_before(imu.t_us - static_cast<int64_t>(1e6 * c.max_gap));
+  }
   if (gap || monitor_.frozen()) {
     // White noise that over this time does what an unseen manoeuvre may do, (M.18).
     noise.accel = kBridgeAccel * std::sqrt(dt);
@@ -183,11 +189,20 @@ void GnssIns::step(const ImuSample& imu) {
 
 void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
   InsCore& core = *core_;
-  pending_.take_due([&]() -> const NavState& { return core.state(); }, [&](const Pending& p) { use(p); });
-  const bool shown = seconds_between(used_at_us_[0], imu.t_us) < kSideslipShown;
-  if (due(next_sideslip_us_, imu.t_us, config_.aiding.sideslip_interval))
-    note(applier_.sideslip(core, gates_, shown), 0);
-  if (due(next_heave_us_, imu.t_us, config_.aiding.heave_interval)) note(applier_.heave(core, gates_, shown), 0);
+  bool wheels = false;
+  pending_.take_due([&]() -> const NavState& { return core.state(); },
+                    [&](const Pending& p) {
+                      wheels = wheels || p.kind == PendingKind::kWheels;
+                      use(p);
+                    });
+  if (wheels) wheels_at_us_ = imu.t_us;
+  // Where wheel speeds come, the constraint joins them: one epoch of updates instead of two.
+  if (wheels || seconds_between(wheels_at_us_, imu.t_us) > kWheelsSilent) {
+    const bool shown = seconds_between(used_at_us_[0], imu.t_us) < kSideslipShown;
+    if (due(next_sideslip_us_, imu.t_us, config_.aiding.sideslip_interval))
+      note(applier_.sideslip(core, gates_, shown), 0);
+    if (due(next_heave_us_, imu.t_us, config_.aiding.heave_interval)) note(applier_.heave(core, gates_, shown), 0);
+  }
   if (block_done && standing_now(core)) {
     note(applier_.standing_velocity(core, gates_), 0);
     note(applier_.standing_rate(core, monitor_.block(), gates_), 0);
@@ -196,19 +211,28 @@ void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
 
 bool GnssIns::due(int64_t& next_us, int64_t t_us, double interval) const {
   if (!config_.aiding.use_sideslip || t_us < next_us) return false;
-  next_us = t_us + static_cast<int64_t>(1e6 * interval);
+  next_us = t_us + static_cast<int64_t>(1e6 * interval) - kDueEarly;
   return true;
 }
 
-void GnssIns::use(const Pending& p) {
-  if (p.kind == PendingKind::kPosition)
+void GnssIns::use(const Pending& measured) {
+  Pending p = measured;
+  if (p.kind == PendingKind::kPosition) {
+    p.cov *= position_noise_.variance_factor();
     use_position(p);
-  else
+  } else if (p.kind == PendingKind::kVelocity) {
+    p.cov *= velocity_noise_.variance_factor();
+    const AidingRecord r = applier_.apply(*core_, p, gates_);
+    velocity_noise_.learn(r);
+    note(r, p.id);
+  } else {
     note(applier_.apply(*core_, p, gates_), p.id);
+  }
 }
 
 void GnssIns::use_position(const Pending& p) {
   AidingRecord r = applier_.apply(*core_, p, gates_);
+  position_noise_.learn(r);
   if (r.status == AidingStatus::kGated) {
     const AidingRecord level = applier_.apply_level(*core_, p, gates_);
     if (level.status == AidingStatus::kAccepted) r = level;

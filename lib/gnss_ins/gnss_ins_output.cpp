@@ -16,7 +16,7 @@ struct OutputCovariance {
   Matrix6d pose;
   Eigen::Matrix3d velocity;
 
-  OutputCovariance(const NavState& x, const Motion& m, const ErrorMatrix& P) {
+  OutputCovariance(const NavState& x, const BodyMotion& m, const ErrorMatrix& P) {
     const Eigen::Matrix3d Rt = x.q_enu_imu.toRotationMatrix().transpose();
     Eigen::Matrix<double, 9, 10> J = Eigen::Matrix<double, 9, 10>::Zero();
     J.block<3, 3>(0, 0).setIdentity();
@@ -66,6 +66,7 @@ void GnssIns::rebase_forward() {
   if (forward_stale_ || !forward_ || forward_to_ < ring_.begin() ||
       behind > kForwardSpan + 1e-6 * static_cast<double>(lag_us_)) {
     forward_.emplace(base);
+    forward_->run_ahead();
     forward_to_ = ring_.begin();
     forward_stale_ = false;
     cov_at_us_ = 0;
@@ -90,7 +91,7 @@ GnssInsOutput GnssIns::output() {
   }
   rebase_forward();
   const NavState& x = forward_->state();
-  const Motion& m = forward_->motion();
+  const BodyMotion& m = forward_->motion();
   const double o = x.imu_offset;  // the sample stamped t was taken o earlier, so t itself lies o ahead
   const Eigen::Vector3d v = x.velocity + o * m.acceleration;
   SE3& T = out.odometry.T_frame_vehicle;

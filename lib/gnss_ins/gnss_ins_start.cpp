@@ -81,12 +81,12 @@ void GnssIns::try_start(const ImuSample& imu) {
         std::max(fix_->heading->sigma, config_.aiding.heading_floor * kDegree) + config_.vehicle.mounting_std.z();
   }
   bank_.start(*anchor_, s);
+  forward_stale_ = true;
   phase_ = AlignmentPhase::kHeading;
 }
 
 void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done) {
   bank_.predict(imu, dt, noise);
-  forward_stale_ = true;
   const auto leader = [&]() -> const NavState& { return bank_.leader().state(); };
   pending_.take_due(leader, [&](const Pending& p) {
     note(bank_.aid([&](InsCore& core) { return applier_.apply(core, p, no_gates_); }), p.id);
@@ -104,6 +104,7 @@ void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& nois
   core_->consider({});
   bank_.stop();
   phase_ = AlignmentPhase::kDone;
+  forward_stale_ = true;
 }
 
 }  // namespace roadfix

@@ -77,7 +77,7 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   // attitude through the lever arm.
   const Eigen::Vector3d gravity = core.earth().gravity(x.position);
   (void)core.fuse(AidingSource::kZeroVelocity, s.t_us, levelling(x, s.mean_accel, gravity, s.accel_std), kNoGate);
-  const Motion still;
+  const BodyMotion still;
   (void)core.fuse(AidingSource::kGnssPosition, s.t_us,
                   gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0, config_.vehicle.p_imu_antenna),
                   kNoGate);

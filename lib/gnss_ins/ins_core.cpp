@@ -19,7 +19,7 @@ void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
   P_ = P;
   sums_ = TransitionSums();
   last_ = InertialStep();
-  motion_ = Motion();
+  motion_ = BodyMotion();
 }
 
 void InsCore::predict(const ImuSample& imu, double dt, const ImuNoise& noise) {
@@ -38,7 +38,7 @@ void InsCore::predict(const ImuSample& imu, double dt, const ImuNoise& noise) {
   motion_.rate += weight * (step.rate - R.transpose() * earth_.rate() - motion_.rate);
   motion_.acceleration += weight * ((x_.velocity - v_before) / dt - motion_.acceleration);
   last_ = step;
-  if (sums_.duration >= config_.propagation.covariance_interval - 1e-9) flush();
+  if (!ahead_ && sums_.duration >= config_.propagation.covariance_interval - 1e-9) flush();
 }
 
 ErrorMatrix InsCore::covariance() const {

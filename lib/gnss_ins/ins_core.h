@@ -25,6 +25,9 @@ class InsCore {
   /// States that measurements do not move from now on, though their uncertainty counts.
   void consider(const StateRange& states) { considered_ = states; }
 
+  /// One transition for all samples from now on, until covariance() is asked for: for carrying a copy a little ahead.
+  void run_ahead() { ahead_ = true; }
+
   /// Moves mean and covariance over the `dt` seconds that end at imu.t_us, (M.1)-(M.16).
   void predict(const ImuSample& imu, double dt, const ImuNoise& noise);
 
@@ -48,7 +51,7 @@ class InsCore {
   [[nodiscard]] ErrorMatrix covariance() const;  ///< at the state's epoch
   /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.
   [[nodiscard]] double longest_age() const;
-  [[nodiscard]] const Motion& motion() const { return motion_; }
+  [[nodiscard]] const BodyMotion& motion() const { return motion_; }
   [[nodiscard]] const InertialStep& last_step() const { return last_; }
   [[nodiscard]] EarthModel& earth() { return earth_; }
   [[nodiscard]] const EarthModel& earth() const { return earth_; }
@@ -59,7 +62,7 @@ class InsCore {
     x_.serialise(a);
     sums_.serialise(a);
     last_.serialise(a);
-    a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size);
+    a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size, ahead_);
   }
 
   /// Adds mean and covariance as they are held.
@@ -82,8 +85,9 @@ class InsCore {
   ErrorMatrix P_ = ErrorMatrix::Identity();
   TransitionSums sums_;
   InertialStep last_;
-  Motion motion_;
+  BodyMotion motion_;
   StateRange considered_;
+  bool ahead_ = false;
 };
 
 }  // namespace roadfix

@@ -63,6 +63,17 @@ class PendingQueue {
     size_ = kept;
   }
 
+  /// Forgets what is stamped before t_us, and counts it.
+  void drop_before(int64_t t_us) {
+    int kept = 0;
+    for (int i = 0; i < size_; ++i) {
+      if (items_[static_cast<size_t>(i)].t_us >= t_us)
+        items_[static_cast<size_t>(kept++)] = items_[static_cast<size_t>(i)];
+    }
+    dropped_ += size_ - kept;
+    size_ = kept;
+  }
+
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] int64_t dropped() const { return dropped_; }
   void clear() { size_ = 0; }

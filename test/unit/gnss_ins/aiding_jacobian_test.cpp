@@ -11,15 +11,15 @@ using roadfix::test::numerical_jacobian;
 namespace {
 
 // The motion that the same raw samples give in the perturbed state: the rate moves with the gyro bias.
-Motion moved(const Motion& m, const ErrorVector& dx) {
-  Motion out = m;
+BodyMotion moved(const BodyMotion& m, const ErrorVector& dx) {
+  BodyMotion out = m;
   out.rate -= dx.segment<3>(kGyroBias);
   return out;
 }
 
 // `make(state, motion)` gives a measurement whose prediction is minus its residual.
 template <int Rows, class Make>
-void check(const Make& make, const NavState& x, const Motion& motion) {
+void check(const Make& make, const NavState& x, const BodyMotion& motion) {
   const Measurement<Rows> m = make(x, motion);
   const auto h = [&](const ErrorVector& dx) {
     return Eigen::Matrix<double, Rows, 1>(m.residual - make(retract(x, dx), moved(motion, dx)).residual);
@@ -32,7 +32,7 @@ void check(const Make& make, const NavState& x, const Motion& motion) {
 template <int Rows, class Make>
 void check_everywhere(const Make& make) {
   test::RandomState random(7);
-  Motion motion;
+  BodyMotion motion;
   check<Rows>(make, NavState(), motion);
   for (int i = 0; i < 20; ++i) {
     const NavState x = random.state(i % 2 == 0 ? 0.05 : 0.5);
@@ -51,41 +51,41 @@ double ahead(const NavState& x, double latency) { return 0.02 - latency + x.imu_
 }  // namespace
 
 TEST_CASE("GNSS position Jacobian") {
-  check_everywhere<3>([](const NavState& x, const Motion& m) {
+  check_everywhere<3>([](const NavState& x, const BodyMotion& m) {
     return gnss_position(x, m, Eigen::Vector3d(1.0, 2.0, 3.0), kCov, ahead(x, x.position_latency), kLever);
   });
 }
 
 TEST_CASE("GNSS velocity Jacobian") {
-  check_everywhere<3>([](const NavState& x, const Motion& m) {
+  check_everywhere<3>([](const NavState& x, const BodyMotion& m) {
     return gnss_velocity(x, m, Eigen::Vector3d(1.0, 2.0, 3.0), kCov, ahead(x, x.velocity_latency), kLever);
   });
 }
 
 TEST_CASE("GNSS heading Jacobian") {
-  check_everywhere<1>([](const NavState& x, const Motion&) { return vehicle_yaw(x, 0.4, 0.01); });
+  check_everywhere<1>([](const NavState& x, const BodyMotion&) { return vehicle_yaw(x, 0.4, 0.01); });
 }
 
 TEST_CASE("magnetic heading Jacobian") {
-  check_everywhere<1>([](const NavState& x, const Motion&) {
+  check_everywhere<1>([](const NavState& x, const BodyMotion&) {
     return magnetic_heading(x, Eigen::Vector3d(20.0, 5.0, -10.0), 0.05, 0.1);
   });
 }
 
 TEST_CASE("wheel speed Jacobian") {
-  check_everywhere<1>([](const NavState& x, const Motion& m) { return wheel_speed(x, m, 5.0, 0.05, 0.0, kLever); });
+  check_everywhere<1>([](const NavState& x, const BodyMotion& m) { return wheel_speed(x, m, 5.0, 0.05, 0.0, kLever); });
 }
 
 TEST_CASE("no sideslip Jacobian") {
-  check_everywhere<2>([](const NavState& x, const Motion& m) { return no_sideslip(x, m, kLever); });
+  check_everywhere<2>([](const NavState& x, const BodyMotion& m) { return no_sideslip(x, m, kLever); });
 }
 
 TEST_CASE("standing Jacobians") {
   const Eigen::Vector3d earth(0.0, 5e-5, 5e-5);
   const Eigen::Vector3d none = Eigen::Vector3d::Zero();
-  check_everywhere<3>([](const NavState& x, const Motion&) { return zero_velocity(x, 0.01); });
-  check_everywhere<3>([&](const NavState& x, const Motion&) { return zero_rate(x, none, earth, 0.01); });
-  check_everywhere<3>([](const NavState& x, const Motion&) {
+  check_everywhere<3>([](const NavState& x, const BodyMotion&) { return zero_velocity(x, 0.01); });
+  check_everywhere<3>([&](const NavState& x, const BodyMotion&) { return zero_rate(x, none, earth, 0.01); });
+  check_everywhere<3>([](const NavState& x, const BodyMotion&) {
     return levelling(x, Eigen::Vector3d(0.0, 0.0, 9.8), Eigen::Vector3d(0.0, 0.0, -9.8), 0.1);
   });
 }

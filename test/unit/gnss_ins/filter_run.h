@@ -1,0 +1,71 @@
+/// Runs the filter over simulated samples as a process would: IMU samples as they come, the rest at a horizon 250 ms
+/// behind.
+#pragma once
+
+#include <functional>
+
+#include "gnss_ins/gnss_ins.h"
+#include "simulation/scenarios.h"
+#include "simulation/simulate.h"
+
+namespace roadfix::test {
+
+/// What a calibration of this simulated car says.
+inline GnssInsConfig filter_config(const ScenarioConfig& s) {
+  GnssInsConfig c;
+  GnssInsVehicle& v = c.vehicle;
+  v.gyro_noise = s.imu.gyro_noise_radps_per_rthz;
+  v.accel_noise = s.imu.accel_noise_mps2_per_rthz;
+  v.gyro_bias_std = s.imu.gyro_bias_std_radps;
+  v.accel_bias_std = s.imu.accel_bias_std_mps2;
+  v.scale_std = s.imu.gyro_scale_std;
+  v.correlation_s = 1e6;  // the biases of these drives are constant
+  v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
+  v.p_imu_antenna = s.gnss.lever_arm_m;
+  return c;
+}
+
+/// The drive's samples, to be broken before a run.
+struct Samples {
+  std::vector<ImuSample> imu;
+  std::vector<GnssFix> gnss;
+  std::vector<WheelSample> wheels;
+
+  explicit Samples(const SimulatedDrive& drive) : imu(drive.imu), gnss(drive.gnss), wheels(drive.wheels) {}
+};
+
+/// Calls seen(filter, now) after every IMU sample.
+inline void run(GnssIns& filter, const Samples& samples, const std::function<void(GnssIns&, int64_t)>& seen) {
+  constexpr int64_t kLateness = 250'000;
+  size_t at_horizon = 0, fix = 0, wheel = 0;
+  for (const ImuSample& newest : samples.imu) {
+    (void)filter.see(newest);
+    while (at_horizon < samples.imu.size() && samples.imu[at_horizon].t_us <= newest.t_us - kLateness) {
+      const int64_t t_us = samples.imu[at_horizon].t_us;
+      while (fix < samples.gnss.size() && samples.gnss[fix].t_us <= t_us) {
+        filter.add(samples.gnss[fix], static_cast<int64_t>(fix));
+        ++fix;
+      }
+      while (wheel < samples.wheels.size() && samples.wheels[wheel].t_us <= t_us) filter.add(samples.wheels[wheel++]);
+      (void)filter.advance(samples.imu[at_horizon++]);
+    }
+    seen(filter, newest.t_us);
+  }
+}
+
+/// Error of an output against the drive's truth: position in enu, rotation in imu axes, velocity in imu axes.
+inline Eigen::Matrix<double, 9, 1> error_of(const GnssIns& filter, const Odometry& estimate,
+                                            const SimulatedDrive& drive) {
+  const Odometry truth = drive.truth_at(estimate.t_us);
+  const EnuAnchor enu(*filter.anchor());
+  SE3 T;
+  T.p = enu.enu(drive.anchor.geodetic(truth.T_frame_vehicle.p));
+  T.q = Eigen::Quaterniond(enu.R_ecef_enu().transpose() * drive.anchor.R_ecef_enu()) * truth.T_frame_vehicle.q *
+        drive.errors.q_vehicle_imu;
+  Eigen::Matrix<double, 9, 1> e;
+  e.head<6>() = local(estimate.T_frame_vehicle, T);
+  e.tail<3>() = drive.errors.q_vehicle_imu.conjugate() * truth.velocity - estimate.velocity;
+  return e;
+}
+
+}  // namespace roadfix::test
