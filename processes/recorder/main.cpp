@@ -1,0 +1,172 @@
+// Records a drive from the bus: everything, in the order of arrival, until SIGINT, SIGTERM or a full disk.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <ctime>
+#include <iostream>
+#include <roadfix/heartbeat_t.hpp>
+#include <thread>
+
+#include "bus/message.h"
+#include "bus/network_bus.h"
+#include "bus/process_facts.h"
+#include "bus/run_clock.h"
+#include "bus/run_process.h"
+#include "config/config.h"
+#include "recorder/message_queue.h"
+#include "recorder/recording.h"
+
+namespace roadfix {
+namespace {
+
+constexpr auto kPatience = std::chrono::milliseconds(50);
+constexpr int64_t kHeartbeat_us = 1'000'000;
+constexpr int kUserError = 2;
+/// The recording ended before it was told to: disk full, quota used up.
+constexpr int kStoppedEarly = 3;
+
+struct Options {
+  std::filesystem::path vehicle;
+  std::string bus = kDefaultBusUrl;
+  std::string folder;
+  bool print_config = false;
+};
+
+/// One recording on its own thread, fed by a queue. The bus thread never waits for the disk.
+class RecordingThread {
+ public:
+  RecordingThread(const RecorderConfig& config, const std::string& name)
+      : queue_(static_cast<std::size_t>(config.memory * kMebi)),
+        recording_(config, name),
+        thread_([this] { work(); }) {}
+  ~RecordingThread() { finish(); }
+  RecordingThread(const RecordingThread&) = delete;
+  RecordingThread& operator=(const RecordingThread&) = delete;
+
+  void push(const BusMessage& message) {
+    queue_.push(std::string(message.channel), message.received_us, message.bytes);
+  }
+
+  /// Waits until everything queued is on the disk.
+  void finish() {
+    done_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+  [[nodiscard]] bool stopped() const { return stopped_; }
+  [[nodiscard]] const MessageQueue& queue() const { return queue_; }
+  /// Only after stopped() or finish().
+  [[nodiscard]] const Recording& recording() const { return recording_; }
+
+ private:
+  void work() {
+    RunClock clock;
+    while (true) {
+      const bool last_round = done_;
+      while (const std::optional<QueuedMessage> message =
+                 queue_.pop(last_round ? std::chrono::milliseconds(0) : kPatience)) {
+        recording_.write(message->channel, message->received_us, message->data);
+        recording_.flush(clock.now_utime());
+        stopped_ = recording_.state() == Recording::State::kStopped;
+      }
+      recording_.flush(clock.now_utime());
+      stopped_ = recording_.state() == Recording::State::kStopped;
+      if (last_round) break;
+    }
+    recording_.note_dropped(queue_.dropped());
+    recording_.close();
+  }
+
+  MessageQueue queue_;
+  Recording recording_;
+  std::atomic<bool> done_ = false;
+  std::atomic<bool> stopped_ = false;
+  std::thread thread_;
+};
+
+/// HEARTBEAT_RECORDER: degraded once something did not reach the disk.
+void publish_heartbeat(NetworkBus& bus, RunClock& clock, ProcessLoad& load, const RecordingThread& recording,
+                       int64_t seq) {
+  heartbeat_t heartbeat{};
+  heartbeat.utime = clock.now_utime();
+  heartbeat.run = clock.run();
+  heartbeat.seq = seq;
+  int64_t dropped = 0;
+  for (const auto& [channel, count] : recording.queue().dropped()) dropped += count;
+  heartbeat.state = heartbeat_t::STATE_RUNNING;
+  if (dropped > 0 || bus.kernel_drops() > 0) {
+    heartbeat.state = heartbeat_t::STATE_DEGRADED;
+    heartbeat.state_reason = fmt::format("{} messages did not fit into memory, the kernel dropped {} datagrams",
+                                         dropped, bus.kernel_drops());
+  }
+  if (recording.stopped()) {
+    heartbeat.state = heartbeat_t::STATE_DEGRADED;
+    heartbeat.state_reason = "not recording: " + recording.recording().reason();
+  }
+  heartbeat.cpu_share = load.cpu_share();
+  heartbeat.rss_bytes = resident_bytes();
+  heartbeat.kernel_drops = bus.kernel_drops();
+  bus.publish("HEARTBEAT_RECORDER", encode(heartbeat));
+}
+
+int record(const Options& options) {
+  RecorderConfig config;
+  if (!options.vehicle.empty()) config = load_config_or_defaults(options.vehicle / "recorder.yaml", config);
+  if (!options.folder.empty()) config.folder = options.folder;
+  if (options.print_config) {
+    std::cout << config_text(config);
+    return 0;
+  }
+  catch_stop_signals();
+  NetworkBus bus(options.bus);
+  RunClock clock;
+  ProcessLoad load;
+  const std::string name = fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
+  RecordingThread recording(config, name);
+  QueuePolicy unlimited;
+  unlimited.max_bytes = static_cast<std::size_t>(config.memory * kMebi);
+  bus.subscribe(
+      config.channels, [&](const BusMessage& message) { recording.push(message); }, unlimited);
+  std::cout << "recording to " << config.folder << "/" << name << ".*.lcm" << std::endl;
+
+  int64_t next_heartbeat_us = 0;
+  bool said = false;
+  for (int64_t seq = 0; !stop_requested();) {
+    bus.handle(kPatience);
+    if (recording.stopped() && !said) {
+      said = true;
+      std::cerr << "recorder: stopped: " << recording.recording().reason() << std::endl;
+    }
+    if (clock.now_utime() < next_heartbeat_us) continue;
+    next_heartbeat_us = clock.now_utime() + kHeartbeat_us;
+    publish_heartbeat(bus, clock, load, recording, seq++);
+  }
+  const bool early = recording.stopped();
+  recording.finish();
+  std::cout << "recorded " << recording.recording().files().size() << " files" << std::endl;
+  return early ? kStoppedEarly : 0;
+}
+
+}  // namespace
+}  // namespace roadfix
+
+int main(int argc, char** argv) {
+  CLI::App app{"Records everything on the bus: LCM logs, split, with a sidecar that says what is in them", "recorder"};
+  roadfix::Options options;
+  app.add_option("--config", options.vehicle, "the vehicle's folder; recorder.yaml in it may be absent")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--bus", options.bus, "LCM URL")->capture_default_str();
+  app.add_option("--folder", options.folder, "where to record to, instead of recorder.yaml's");
+  app.add_flag("--print-config", options.print_config, "print the effective configuration and end");
+  try {
+    app.parse(argc, argv);
+    return roadfix::record(options);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : roadfix::kUserError;
+  } catch (const std::exception& e) {
+    std::cerr << "recorder: " << e.what() << "\n";
+    return roadfix::kUserError;
+  }
+}
