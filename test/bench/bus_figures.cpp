@@ -25,7 +25,7 @@ using namespace roadfix;
 
 namespace {
 
-constexpr int kMessages = 8000;
+constexpr int kMessages = 3000;
 constexpr std::size_t kBytes = 200;
 const std::string kBareUrl = "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
 const std::string kOurUrl = "udpm://239.255.76.67:7702?ttl=0";

@@ -1,19 +1,35 @@
 #!/usr/bin/env bash
 # Three stages on real UDP in a network namespace of their own, recorded by lcm-logger, then verified: nothing may differ.
-#   live.sh BIN clean|starved|killed|late_recording
+# In ip_loss the stages live in a second namespace, behind a link that drops 0.1 % of the packets.
+#   live.sh BIN clean|starved|killed|late_recording|ip_loss
 set -euo pipefail
 bin=$1; trouble=$2
 if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
   command -v lcm-logger >/dev/null || { echo "skipped: no lcm-logger"; exit 0; }
+  [[ $trouble != ip_loss ]] || command -v nft >/dev/null || { echo "skipped: no nft"; exit 0; }
   unshare -n true 2>/dev/null || { echo "skipped: no right to make a network namespace"; exit 0; }
   exec env ROADFIX_IN_NAMESPACE=1 unshare -n "$0" "$@"
 fi
-ip link set lo up && ip route add 224.0.0.0/4 dev lo
 folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$folder"' EXIT
 url='udpm://239.255.76.67:7667?ttl=0'
+there=()  # runs a command where the stages are
+if [[ $trouble == ip_loss ]]; then
+  url='udpm://239.255.76.67:7667?ttl=1'
+  unshare -n sleep 100 & other=$!
+  sleep 0.3
+  there=(nsenter -t "$other" -n)
+  ip link add here type veth peer name there
+  ip link set there netns "$other"
+  ip addr add 10.9.0.1/24 dev here && ip link set here up && ip route add 224.0.0.0/4 dev here
+  "${there[@]}" bash -c 'ip addr add 10.9.0.2/24 dev there && ip link set lo up && ip link set there up && ip route add 224.0.0.0/4 dev there
+    nft "add table ip loss; add chain ip loss in { type filter hook input priority 0; }; add rule ip loss in iif there udp dport 7667 numgen random mod 1000 == 0 counter drop"'
+  sleep 1
+else
+  ip link set lo up && ip route add 224.0.0.0/4 dev lo
+fi
 starved_url=$url; [[ $trouble == starved ]] && starved_url+='&recv_buf_size=2500'
 declare -A stage
-start() { "$bin/chain_process" --config "/$1" --bus "${2:-$url}" 2>>"$folder/stages.err" & stage[$1]=$!; }
+start() { "${there[@]}" "$bin/chain_process" --config "/$1" --bus "${2:-$url}" 2>>"$folder/stages.err" & stage[$1]=$!; }
 
 record() { lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/null 2>&1 & logger=$!; }
 [[ $trouble == late_recording ]] || record
@@ -37,6 +53,9 @@ read -r _ identical _ differing _ unverifiable < <(tail -n 1 "$folder/verdict")
 fail() { echo "live $trouble: $*"; exit 1; }
 [[ $differing -eq 0 ]] || fail 'something differs'
 [[ $identical -gt 2000 ]] || fail 'too little was verified'
+if [[ $trouble == ip_loss ]]; then
+  echo "dropped on the way: $("${there[@]}" nft list chain ip loss in | grep -o 'packets [0-9]*')"
+fi
 # On a busy machine lcm-logger itself loses messages; without that, and from the beginning, everything can be verified.
 if ! grep -q 'lost by the logger' "$folder/verdict" && [[ $trouble != late_recording ]]; then
   [[ $unverifiable -eq 0 ]] || fail 'unverifiable, but the logger lost nothing'
