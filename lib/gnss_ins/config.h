@@ -24,6 +24,8 @@ struct GnssInsVehicle {
   double wheel_noise = 0.05;                                        ///< m/s
   double track_width = 1.5;                                         ///< m, for four wheel speeds
   double magnetic_declination = 0.0;                                ///< rad, east positive
+  Eigen::Vector3d hard_iron = Eigen::Vector3d::Zero();              ///< T, subtracted from the field first
+  Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();          ///< multiplies what is left
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw of imu against vehicle
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();          ///< m, imu axes
   Eigen::Vector3d p_imu_vehicle = Eigen::Vector3d::Zero();          ///< m, where wheels measure, imu axes
@@ -56,6 +58,7 @@ struct AidingConfig {
   double zero_rate_std = 2.0e-3;    ///< rad/s
   double zero_interval = 0.5;       ///< s
   double mag_std = 0.1;             ///< rad
+  double mag_interval = 1.0;        ///< s between two uses: its errors are correlated
   bool use_gnss_velocity = true;
   bool use_sideslip = true;
   bool use_wheels = true;
@@ -65,13 +68,13 @@ struct AidingConfig {
 
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
-  double start_std = 0.05;      ///< m/s, before anything is learnt
+  double start_std = 0.1;      ///< m/s, before anything is learnt
   double min_std = 0.003;       ///< m/s
   double max_std = 0.5;         ///< m/s
   double doubling_accel = 1.0;  ///< m/s2 of lateral acceleration that doubles it
   double prior_count = 5.0;     ///< residuals that the start counts for
   double memory_count = 400.0;  ///< residuals
-  double confidence = 2.0;      ///< sigmas of the learnt variance that are added to it
+  double confidence = 3.0;      ///< sigmas of the learnt variance that are added to it
   double min_speed = 2.0;       ///< m/s, to learn
 };
 
@@ -140,6 +143,7 @@ void visit(AidingConfig& c, Visitor& v) {
   v.number("zero_velocity_std_mps", c.zero_velocity_std, 1e-4, 1.0);
   v.number("zero_rate_std_radps", c.zero_rate_std, 1e-6, 1.0);
   v.number("zero_interval_s", c.zero_interval, 0.1, 10.0);
+  v.number("mag_interval_s", c.mag_interval, 0.0, 1000.0);
   v.number("mag_std_rad", c.mag_std, 1e-3, 3.0);
   v.boolean("use_gnss_velocity", c.use_gnss_velocity);
   v.boolean("use_sideslip", c.use_sideslip);

@@ -133,12 +133,15 @@ void GnssIns::add(const WheelSample& wheels, int64_t id) {
 }
 
 void GnssIns::add(const MagSample& mag, int64_t id) {
-  if (!config_.aiding.use_mag || !mag.field.allFinite() || mag.field.norm() <= 0.0) return;
+  if (!config_.aiding.use_mag || !mag.field.allFinite()) return;
+  if (seconds_between(last_mag_us_, mag.t_us) < config_.aiding.mag_interval) return;
+  last_mag_us_ = mag.t_us;
   Pending p;
   p.kind = PendingKind::kMag;
   p.t_us = mag.t_us;
   p.id = id;
-  p.value = mag.field;
+  p.value = config_.vehicle.soft_iron * (mag.field - config_.vehicle.hard_iron);
+  if (p.value.norm() <= 0.0) return;
   pending_.push(p);
 }
 
@@ -224,6 +227,13 @@ void GnssIns::use(const Pending& measured) {
     p.cov *= velocity_noise_.variance_factor();
     const AidingRecord r = applier_.apply(*core_, p, gates_);
     velocity_noise_.learn(r);
+    note(r, p.id);
+  } else if (p.kind == PendingKind::kMag && core_->heading_std() < config_.aiding.mag_std) {
+    // Its errors do not average out: once the heading is better than the magnetometer, it only harms.
+    AidingRecord r;
+    r.t_us = p.t_us;
+    r.source = AidingSource::kMagHeading;
+    r.status = AidingStatus::kDisabled;
     note(r, p.id);
   } else {
     note(applier_.apply(*core_, p, gates_), p.id);

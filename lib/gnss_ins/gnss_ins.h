@@ -104,7 +104,7 @@ class GnssIns {
   Matrix6d cov_pose_ = Matrix6d::Zero();
   Eigen::Matrix3d cov_velocity_ = Eigen::Matrix3d::Zero();
   int64_t next_sideslip_us_ = 0, next_heave_us_ = 0;
-  int64_t last_wheel_us_ = 0, wheels_at_us_ = 0;
+  int64_t last_mag_us_ = 0, last_wheel_us_ = 0, wheels_at_us_ = 0;
   std::optional<GnssFix> fix_, fix_before_;  // newest good ones, for the start
   std::optional<double> wheel_speed_;
   std::array<int64_t, kAidingSources> used_at_us_{};

@@ -5,6 +5,8 @@
 /// the covariance steps begin and end; no allocation. Not thread safe.
 #pragma once
 
+#include <cmath>
+
 #include "gnss_ins/aiding.h"
 #include "gnss_ins/covariance_step.h"
 
@@ -49,6 +51,8 @@ class InsCore {
 
   [[nodiscard]] const NavState& state() const { return x_; }
   [[nodiscard]] ErrorMatrix covariance() const;  ///< at the state's epoch
+  /// rad, as of the last covariance step.
+  [[nodiscard]] double heading_std() const { return std::sqrt(P_(kAtt + 2, kAtt + 2)); }
   /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.
   [[nodiscard]] double longest_age() const;
   [[nodiscard]] const BodyMotion& motion() const { return motion_; }

@@ -17,6 +17,8 @@ namespace roadfix {
 
 namespace {
 
+constexpr double kMicrotesla = 1e-6;
+
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
@@ -44,6 +46,8 @@ class GnssInsStage final : public Stage {
       : config_(config), pose_slot_(config.publish_period), status_slot_(config.status_period) {
     static_cast<GnssInsTuning&>(filter_config_) = config.tuning;
     filter_config_.vehicle = gnss_ins_vehicle(calibration);
+    // Without the declination a magnetic heading is not a heading.
+    if (!calibration.sensors.mag || !calibration.sensors.mag->declination_deg) filter_config_.aiding.use_mag = false;
     filter_.emplace(filter_config_);
     spec_.name = "gnss_ins_ekf";
     spec_.inputs = {{"IMU", "imu_t", 0, 0},
@@ -155,8 +159,11 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     take(wheels->speed_noise, v.wheel_noise);
     take(wheels->track_width, v.track_width);
   }
-  if (const auto& mag = calibration.sensors.mag; mag && mag->declination_deg)
-    v.magnetic_declination = *mag->declination_deg * kDegree;
+  if (const auto& mag = calibration.sensors.mag) {
+    if (mag->declination_deg) v.magnetic_declination = *mag->declination_deg * kDegree;
+    if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;
+    take(mag->soft_iron, v.soft_iron);
+  }
   if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
   return v;
 }
