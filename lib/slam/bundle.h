@@ -3,7 +3,7 @@
 /// section 6). MODEL.md (M.8)-(M.13).
 ///
 /// Written out here instead of handed to Ceres because the reduced system's inverse is the covariance that we publish,
-/// and because it costs a third; a test solves the same problem with Ceres and compares.
+/// (its cost against Ceres was not measured); a test solves the same problem with Ceres and compares.
 #pragma once
 
 #include <vector>
