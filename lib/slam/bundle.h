@@ -2,7 +2,7 @@
 /// fit best. Levenberg and Marquardt's method on the reduced camera system (Triggs et al., Bundle Adjustment, 2000,
 /// section 6). MODEL.md (M.8)-(M.13).
 ///
-/// Written out here instead of handed to Ceres because the reduced system's inverse is the covariance that we publish,
+/// Written out here instead of handed to Ceres because the reduced system's inverse is the covariance that we publish
 /// (its cost against Ceres was not measured); a test solves the same problem with Ceres and compares.
 #pragma once
 
