@@ -12,6 +12,8 @@ namespace {
 /// The seqs of one run of a channel. Only gaps and repetitions count, not the order in which they came.
 using Seqs = std::vector<int64_t>;
 
+constexpr uint64_t kLargestGap = 1'000'000'000;
+
 class Surveyor {
  public:
   explicit Surveyor(LogReader& reader) : reader_(reader) {
@@ -65,8 +67,10 @@ class Surveyor {
   static void count_gaps(ChannelSurvey& channel, Seqs& seqs) {
     std::sort(seqs.begin(), seqs.end());
     for (std::size_t i = 1; i < seqs.size(); ++i) {
-      if (seqs[i] == seqs[i - 1]) ++channel.repeated;
-      if (seqs[i] > seqs[i - 1] + 1) channel.missing += seqs[i] - seqs[i - 1] - 1;
+      // Unsigned: a hostile log may hold the extremes. What is larger than any real gap counts as that.
+      const uint64_t step = static_cast<uint64_t>(seqs[i]) - static_cast<uint64_t>(seqs[i - 1]);
+      if (step == 0) ++channel.repeated;
+      if (step > 1) channel.missing += static_cast<int64_t>(std::min<uint64_t>(step - 1, kLargestGap));
     }
   }
 

@@ -34,6 +34,13 @@ inline std::optional<Header> read_header(std::span<const uint8_t> bytes) {
   return Header{read_int64(bytes.data() + 8), read_int64(bytes.data() + 16), read_int64(bytes.data() + 24)};
 }
 
+/// False for numbers that no clock and no counter reaches, and that sums would overflow with.
+inline bool is_plausible(const Header& header) {
+  constexpr int64_t kLimit = int64_t{1} << 61;
+  const auto within = [](int64_t value) { return -kLimit < value && value < kLimit; };
+  return within(header.utime) && within(header.run) && within(header.seq);
+}
+
 /// Decodes a message that was checked before; a wrong fingerprint or length is a programmer's error and throws.
 template <class T>
 T decode(std::span<const uint8_t> bytes) {

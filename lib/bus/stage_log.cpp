@@ -35,7 +35,7 @@ struct Collector {
                              ": " + to_words(result));
         continue;
       }
-      take(message.header, bytes);
+      if (is_plausible(message.header)) take(message.header, bytes);
     }
   }
 

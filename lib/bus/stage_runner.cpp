@@ -60,6 +60,10 @@ Offer StageRunner::offer(int input, std::span<const uint8_t> bytes) {
     return Offer::kRefused;
   }
   const Header header = *read_header(bytes);
+  if (!is_plausible(header)) {
+    stream_.note_undecodable(input, std::nullopt);
+    return Offer::kRefused;
+  }
   const Offer offer = stream_.offer(input, {header.utime, header.run, header.seq}, bytes);
   if (offer == Offer::kTick) tick({input, header.utime, header.run, header.seq, bytes});
   return offer;

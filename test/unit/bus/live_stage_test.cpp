@@ -69,6 +69,25 @@ TEST_CASE("a stage on a bus publishes outputs, ledger, heartbeat and configurati
   REQUIRE(pose.provenance.num_applied == std::vector<int64_t>{275, 10, 138});
 }
 
+TEST_CASE("a message with impossible numbers is undecodable") {
+  MemoryBus bus;
+  Ear ear(bus);
+  LiveStage live(std::make_unique<ChainStage>(filter_spec()), bus);
+  for (const DriveMessage& message : small_drive(2.0)) bus.publish(message.channel, message.bytes);
+  for (const int64_t extreme : {std::numeric_limits<int64_t>::max(), std::numeric_limits<int64_t>::min()}) {
+    for (int64_t imu_t::*field : {&imu_t::utime, &imu_t::run, &imu_t::seq}) {
+      imu_t imu{};
+      imu.utime = kDriveStart_us + 3'000'000;
+      imu.run = kDriveStart_us;
+      imu.*field = extreme;
+      bus.publish("IMU", encode(imu));
+    }
+  }
+  live.step(std::chrono::milliseconds(0));
+  REQUIRE(live.runner().stream().track(0).counters.undecodable == 6);
+  REQUIRE(ear.heard["POSE_INS"].size() == 200);
+}
+
 TEST_CASE("two publishers on a channel are said") {
   MemoryBus bus;
   Ear ear(bus);
