@@ -68,7 +68,7 @@ struct AidingConfig {
 
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
-  double start_std = 0.1;      ///< m/s, before anything is learnt
+  double start_std = 0.1;       ///< m/s, before anything is learnt
   double min_std = 0.003;       ///< m/s
   double max_std = 0.5;         ///< m/s
   double doubling_accel = 1.0;  ///< m/s2 of lateral acceleration that doubles it
