@@ -23,10 +23,12 @@ inline F8 clamp01(F8 x) { return clamp(x, splat(0.0F), splat(1.0F)); }
 inline F8 mix(F8 a, F8 b, F8 share) { return a + (b - a) * share; }
 inline F8 to_float(I8 x) { return __builtin_convertvector(x, F8); }
 inline I8 to_int(F8 x) { return __builtin_convertvector(x, I8); }
+/// Wraps around: lanes whose ray hit nothing carry any number and must not overflow.
+inline I8 add_wrapping(I8 a, I8 b) { return (I8)((U8)a + (U8)b); }
 /// For |x| < 2^31; a comparison gives -1 where it holds, which is the correction of the truncation.
 inline I8 floor_int(F8 x) {
   const I8 truncated = to_int(x);
-  return truncated + (to_float(truncated) > x);
+  return add_wrapping(truncated, to_float(truncated) > x);
 }
 inline bool any(I8 mask) {
   const auto x = (I4x64)mask;

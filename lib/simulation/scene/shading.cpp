@@ -81,7 +81,7 @@ FaceLanes gather(const RayWindow& window, const HitLanes& hit) {
 void carry_block(F8& x, I8& block) {
   const I8 over = floor_int(x * static_cast<float>(1.0 / kTextureBlock_m));
   x -= to_float(over) * static_cast<float>(kTextureBlock_m);
-  block += over;
+  block = add_wrapping(block, over);
 }
 
 /// Texture coordinates and footprint of the points hit: a step of one pixel moves the point in the face's plane.
