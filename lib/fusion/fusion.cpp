@@ -48,8 +48,8 @@ const MotionFloor& Fusion::floor(FusionChannel c) const {
   return c == FusionChannel::kVo ? config_.vo_floor : config_.wheel_floor;
 }
 
-bool Fusion::alive(FusionChannel c) const {
-  return memory(c).alive_us && seconds_between(*memory(c).alive_us, t_us_) < timeout(c);
+bool Fusion::alive_at(FusionChannel c, int64_t t_us) const {
+  return memory(c).alive_us && seconds_between(*memory(c).alive_us, t_us) < timeout(c);
 }
 
 void Fusion::set_gnss(int64_t t_us, bool present) {
@@ -67,6 +67,12 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (!usable(s.odometry)) return done(FuseStatus::kBadInput);
   if (started_ && s.odometry.t_us < t_us_) return done(FuseStatus::kNotReady);
   const bool good = s.odometry.validity != Validity::kInvalid;
+  if (s.channel == FusionChannel::kWheel && good && alive_at(FusionChannel::kIns, s.odometry.t_us)) {
+    // Wheels and imu are in the INS already. Not even a step is split for them.
+    memory(s.channel).last.reset();
+    memory(s.channel).alive_us = report.last_us = s.odometry.t_us;
+    return done(FuseStatus::kDisabled);
+  }
   if (!started_ && !good) return done(FuseStatus::kBadQuality);
   if (!started_) start(s);
 

@@ -39,6 +39,8 @@ struct ChannelReport {
   double alpha = 1.0;   ///< on the channel's own covariance
   double nis = 0.0;     ///< of the last attempt
   int dof = 0;
+  Eigen::Vector3d innovation = Eigen::Vector3d::Zero();           ///< the first dof count
+  Eigen::Vector3d innovation_variance = Eigen::Vector3d::Zero();  ///< SI units of the innovation, squared
   double gate = 0.0;
   std::optional<int64_t> last_us;
 };
@@ -73,8 +75,24 @@ class Fusion {
   FuseStatus add(const ChannelSample& sample);
 
   [[nodiscard]] int64_t t_us() const { return t_us_; }
-  [[nodiscard]] Odometry fused() const;  ///< POSE_FUSED, enu
-  [[nodiscard]] Odometry local() const;  ///< POSE_LOCAL: never jumps
+  /// Motion since t_us() as a channel tells it that the fusion has not used yet.
+  struct Ahead {
+    double dt = 0.0;              ///< s
+    double silent = 0.0;          ///< s of it in which the channel told nothing; at its end
+    Planar way = Planar::Zero();  ///< in the axes of its start
+    double rise = 0.0;            ///< m
+    FusionChannel channel = FusionChannel::kIns;
+    bool metric = true;
+    const Odometry* felt = nullptr;  ///< the channel's newest velocities and attitude
+  };
+  struct Poses {
+    Odometry fused;  ///< POSE_FUSED, enu
+    Odometry local;  ///< POSE_LOCAL: never jumps
+  };
+  /// The poses carried forward by that motion.
+  [[nodiscard]] Poses carried(const Ahead& ahead) const;
+  [[nodiscard]] Odometry fused() const { return carried({}).fused; }
+  [[nodiscard]] Odometry local() const { return carried({}).local; }
   [[nodiscard]] FusionReport report() const;
   [[nodiscard]] const ChannelReport& channel(FusionChannel c) const { return reports_[static_cast<std::size_t>(c)]; }
   [[nodiscard]] const Imm& imm() const { return imm_; }
@@ -100,12 +118,23 @@ class Fusion {
     ConsistencyCheck check;
   };
 
+  /// The estimate after a motion that it has not used.
+  struct Forward {
+    PlanarEstimate planar;
+    Planar way = Planar::Zero();  ///< without the velocity's error: an estimate of it that changes would be a jump
+    double speed = 0.0;
+    double speed_variance = 0.0;
+    double turn = 0.0;
+  };
+
+  [[nodiscard]] Forward forward(const Ahead& ahead) const;
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visitor);
 
   [[nodiscard]] Memory& memory(FusionChannel c) { return memories_[static_cast<std::size_t>(c)]; }
   [[nodiscard]] const Memory& memory(FusionChannel c) const { return memories_[static_cast<std::size_t>(c)]; }
-  [[nodiscard]] bool alive(FusionChannel c) const;
+  [[nodiscard]] bool alive_at(FusionChannel c, int64_t t_us) const;
+  [[nodiscard]] bool alive(FusionChannel c) const { return alive_at(c, t_us_); }
   [[nodiscard]] double timeout(FusionChannel c) const;
   [[nodiscard]] const MotionFloor& floor(FusionChannel c) const;
   [[nodiscard]] static ChannelSlots slots(FusionChannel c);
@@ -132,8 +161,15 @@ class Fusion {
   void ask_restart(const char* reason);
   void weigh(FusionChannel c, double information);
   [[nodiscard]] bool better_yaw_elsewhere(const ChannelSample& sample, double yaw_rate_variance) const;
+  /// What the modes' innovations were, in the mean.
+  template <int M>
+  struct Mean {
+    Innovation<M> innovation;
+    Eigen::Matrix<double, M, 1> difference = Eigen::Matrix<double, M, 1>::Zero();
+  };
   template <int M, class At>
-  double update(const At& at);  ///< at(x): the measurement linearised there; returns the mean NIS
+  Mean<M> update(const At& at);  ///< at(x): the measurement linearised there
+  static void tell(const Innovation<3>& innovation, const Eigen::Vector3d& difference, ChannelReport& report);
 
   FusionConfig config_;
   bool started_ = false;
@@ -161,9 +197,8 @@ class Fusion {
   std::optional<int64_t> last_tie_us_;
   bool vo_scale_open_ = true;  ///< a non-metric vision's scale has no value yet
   ReturnState comeback_;
-  Planar local_ = Planar::Zero();
+  PlanarEstimate local_;
   double local_height_ = 0.0;
-  Eigen::Matrix3d local_covariance_ = Eigen::Matrix3d::Zero();
   double local_height_variance_ = 0.0;
 };
 

@@ -1,7 +1,8 @@
-// What the fusion tells: poses, height, report, snapshot (MODEL.md, section 9).
+// What the fusion tells: local pose, height, report, snapshot (MODEL.md, section 9).
 #include <cmath>
 
 #include "fusion/fusion.h"
+#include "fusion/saved.h"
 #include "geometry/euler.h"
 #include "geometry/so3.h"
 
@@ -11,68 +12,9 @@ using namespace fusion;
 
 namespace {
 
-constexpr double kLostSigma = 100.0;   ///< m: nobody should drive by this
-constexpr double kHeightShare = 0.01;  ///< of the way: what a height loses by it, at least
-constexpr double kHeightFloor = 0.01;  ///< m per sqrt(s)
-
-/// Rates of (roll, pitch, yaw) by rotation in vehicle axes; its inverse carries angle errors to rotation errors.
-Eigen::Matrix3d angles_by_rotation(const YawPitchRoll& a) {
-  const double sr = std::sin(a.roll), cr = std::cos(a.roll), sp = std::sin(a.pitch), cp = std::cos(a.pitch);
-  Eigen::Matrix3d E;
-  E << 1.0, sr * sp / cp, cr * sp / cp, 0.0, cr, -sr, 0.0, sr / cp, cr / cp;
-  return E;
-}
-
-/// A full pose from a planar one, a height and somebody's roll and pitch.
-Odometry full_pose(int64_t t_us, const Planar& pose, const Eigen::Matrix3d& P, double height, double height_variance,
-                   const Odometry& attitude) {
-  Odometry o = attitude;
-  o.t_us = t_us;
-  const YawPitchRoll a = yaw_pitch_roll(attitude.T_frame_vehicle.q);
-  o.T_frame_vehicle.p << pose.x(), pose.y(), height;
-  o.T_frame_vehicle.q = quaternion({pose.z(), a.pitch, a.roll});
-  const Eigen::Matrix3d E = angles_by_rotation(a);
-  const Eigen::Matrix3d to_rotation = E.inverse();
-  const Eigen::Matrix3d angles = E * attitude.cov_pose.bottomRightCorner<3, 3>() * E.transpose();
-  // Components: east, north, up, roll, pitch, yaw.
-  Matrix6d C = Matrix6d::Zero();
-  C.topLeftCorner<2, 2>() = P.topLeftCorner<2, 2>();
-  C(2, 2) = height_variance;
-  C.block<2, 2>(3, 3) = angles.topLeftCorner<2, 2>();
-  C(5, 5) = P(2, 2);
-  C.block<2, 1>(0, 5) = P.block<2, 1>(0, 2);
-  C.block<1, 2>(5, 0) = P.block<1, 2>(2, 0);
-  Matrix6d J = Matrix6d::Identity();
-  J.bottomRightCorner<3, 3>() = to_rotation;
-  o.cov_pose = J * C * J.transpose();
-  return o;
-}
+constexpr double kLostSigma = 100.0;  ///< m: nobody should drive by this
 
 }  // namespace
-
-Odometry Fusion::fused() const {
-  Planar pose = now_.x.segment<3>(kPos) + comeback_.residual;
-  pose.z() = wrap_angle(pose.z());
-  const Eigen::Matrix3d P = now_.P.block<3, 3>(kPos, kPos) + comeback_.residual * comeback_.residual.transpose();
-  Odometry o = full_pose(t_us_, pose, P, height_ + comeback_.height,
-                         height_variance_ + comeback_.height * comeback_.height, attitude_);
-  o.velocity.x() = now_.x(kSpeed);
-  o.cov_velocity.row(0).setZero();
-  o.cov_velocity.col(0).setZero();
-  o.cov_velocity(0, 0) = now_.P(kSpeed, kSpeed);
-  o.angular_rate.z() = now_.x(kTurn);
-  o.validity = report().validity;
-  return o;
-}
-
-Odometry Fusion::local() const {
-  Odometry o = fused();
-  const Odometry l = full_pose(t_us_, local_, local_covariance_, local_height_, local_height_variance_, attitude_);
-  o.T_frame_vehicle = l.T_frame_vehicle;
-  o.cov_pose = l.cov_pose;
-  o.validity = report().local_validity;
-  return o;
-}
 
 /// The local pose goes on by the motion from the last posterior to what is known before any absolute pose is used. What
 /// of it the speed cannot explain is hindsight (a turn shows which way the drift went): the local pose leaves it out,
@@ -86,13 +28,8 @@ void Fusion::follow_local(const FusionEstimate& before, double dt) {
     take_fix(comeback_, config_.comeback, {shift.x(), shift.y(), 0.0}, false);
     motion = driven;
   }
-  const Eigen::Matrix3d R = motion_covariance(before.x.segment<3>(kPos), before.P.block<3, 3>(kPos, kPos), motion,
-                                              now_.P.block<3, 3>(kPos, kPos), Eigen::Vector3d::Constant(1e-5));
-  const Eigen::Matrix3d carry = after_motion_by_start(local_, motion);
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  turn.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(local_.z()).toRotationMatrix();
-  local_covariance_ = carry * local_covariance_ * carry.transpose() + turn * R * turn.transpose();
-  local_ = after_motion(local_, motion);
+  local_ = moved_along(local_, {before.x.segment<3>(kPos), before.P.block<3, 3>(kPos, kPos)}, motion,
+                       now_.P.block<3, 3>(kPos, kPos));
 }
 
 /// Height by the channel that speaks for the motion: its own steps, with what its covariance grows by.
@@ -104,8 +41,7 @@ void Fusion::move_height(const ChannelSample& s) {
   double step = s.odometry.T_frame_vehicle.p.z() - m.last->T_frame_vehicle.p.z();
   const double way = s.odometry.velocity.norm() * dt;
   if (std::abs(step) > config_.jump_tolerance + 0.3 * way) step = 0.0;
-  const double sigma = kHeightFloor * std::sqrt(dt) + kHeightShare * way;
-  const double grown = std::max(s.odometry.cov_pose(2, 2) - m.last->cov_pose(2, 2), sigma * sigma);
+  const double grown = std::max(s.odometry.cov_pose(2, 2) - m.last->cov_pose(2, 2), height_growth(way, dt));
   height_ += step;
   height_variance_ += grown;
   local_height_ += step;
@@ -160,41 +96,12 @@ FusionReport Fusion::report() const {
   return r;
 }
 
-namespace {
-
-template <class T>
-void write(StateWriter& w, const T& value) {
-  w.put(value);
-}
-template <class T>
-void write(StateWriter& w, const std::optional<T>& value) {
-  w.put(value.has_value());
-  w.put(value.value_or(T{}));
-}
-template <class T>
-void read(StateReader& r, T& value) {
-  r.get(value);
-}
-template <class T>
-void read(StateReader& r, std::optional<T>& value) {
-  const bool has = r.get<bool>();
-  value = r.get<T>();
-  if (!has) value.reset();
-}
-
-template <class Odometry, class Visitor>
-void visit_odometry(Odometry& o, const Visitor& visit) {
-  visit(o.t_us, o.T_frame_vehicle.q.coeffs(), o.T_frame_vehicle.p, o.velocity, o.angular_rate, o.cov_pose,
-        o.cov_velocity, o.validity);
-}
-
-}  // namespace
-
 template <class Self, class Visitor>
 void Fusion::visit_members(Self& self, const Visitor& visit) {
   visit(self.started_, self.placed_, self.t_us_, self.imm_.probability, self.now_.x, self.now_.P);
   for (auto& mode : self.imm_.modes) visit(mode.estimate.x, mode.estimate.P, mode.log_likelihood);
-  for (auto& r : self.reports_) visit(r.status, r.weight, r.alpha, r.nis, r.dof, r.gate, r.last_us);
+  for (auto& r : self.reports_)
+    visit(r.status, r.weight, r.alpha, r.nis, r.dof, r.innovation, r.innovation_variance, r.gate, r.last_us);
   for (auto& share : self.information_) visit(share);
   visit(self.height_, self.height_variance_, self.gnss_, self.ramp_.gnss, self.ramp_.changed_us,
         self.ramp_.level_at_change, self.agreement_.agrees, self.agreement_.count);
@@ -204,7 +111,7 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
         self.distrust_, self.last_tie_us_, self.vo_scale_open_);
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
-  visit(self.local_, self.local_height_, self.local_covariance_, self.local_height_variance_);
+  visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);
 }
 
 void Fusion::save(StateWriter& writer) const {

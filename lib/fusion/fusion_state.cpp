@@ -35,8 +35,8 @@ void clone_pose(FusionEstimate& e, int clone) {
 }
 
 template <int M>
-Innovation kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
-                         const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
+Innovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
+                            const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
   if (!R.allFinite()) return {};  // infinite variance tells nothing
   const Eigen::Matrix<double, kSize, M> PH = e.P * H.transpose();
   const Eigen::Matrix<double, M, M> S = H * PH + R;
@@ -49,22 +49,22 @@ Innovation kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, kSize
   e.P -= W * W.transpose();
   const double nis = whitened.squaredNorm();
   const double log_det = 2.0 * L.diagonal().array().log().sum();
-  return {nis, -0.5 * (nis + log_det + M * std::log(2.0 * kPi))};
+  return {nis, -0.5 * (nis + log_det + M * std::log(2.0 * kPi)), S.diagonal()};
 }
 
 template <int M>
-double squared_distance(const FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
-                        const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
-  if (!R.allFinite()) return 0.0;
+Innovation<M> judge(const FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
+                    const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
+  if (!R.allFinite()) return {};
   const Eigen::Matrix<double, M, M> S = H * e.P * H.transpose() + R;
-  return innovation.dot(S.ldlt().solve(innovation));
+  return {innovation.dot(S.ldlt().solve(innovation)), 0.0, S.diagonal()};
 }
 
-#define ROADFIX_FUSION_UPDATES(M)                                                                               \
-  template Innovation kalman_update<M>(FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,                 \
-                                       const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&); \
-  template double squared_distance<M>(const FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,            \
-                                      const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&);
+#define ROADFIX_FUSION_UPDATES(M)                                                                                  \
+  template Innovation<M> kalman_update<M>(FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,                 \
+                                          const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&); \
+  template Innovation<M> judge<M>(const FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,                   \
+                                  const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&);
 ROADFIX_FUSION_UPDATES(1)
 ROADFIX_FUSION_UPDATES(2)
 ROADFIX_FUSION_UPDATES(3)

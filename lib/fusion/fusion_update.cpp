@@ -22,12 +22,6 @@ constexpr double kWrongFor = 1.0;          ///< s: a position that is wrong by d
 constexpr double kTieSpacing = 1.0;  ///< s: the tie's comparisons are that far apart, for their errors' correlation
 constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 
-/// Yaw rate of the level axes.
-double level_turn(const Odometry& o) {
-  const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
-  return (o.angular_rate.y() * std::sin(a.roll) + o.angular_rate.z() * std::cos(a.roll)) / std::cos(a.pitch);
-}
-
 /// The INS has used a fix since its last sample: something of its pose became surer.
 bool corrected(const Odometry& last, const Odometry& now) {
   const Eigen::Vector3d before = planar_covariance(last).diagonal(), after = planar_covariance(now).diagonal();
@@ -37,16 +31,26 @@ bool corrected(const Odometry& last, const Odometry& now) {
 }  // namespace
 
 template <int M, class At>
-double Fusion::update(const At& at) {
-  double nis = 0.0;
+Fusion::Mean<M> Fusion::update(const At& at) {
+  Mean<M> mean;
   for (std::size_t i = 0; i < kModes; ++i) {
     Mode& mode = imm_.modes[i];
     const Measurement<M> m = at(mode.estimate.x);
-    const Innovation innovation = kalman_update<M>(mode.estimate, m.H, m.innovation, m.R);
+    const Innovation<M> innovation = kalman_update<M>(mode.estimate, m.H, m.innovation, m.R);
     mode.log_likelihood += innovation.log_likelihood;
-    nis += imm_.probability(static_cast<Eigen::Index>(i)) * innovation.nis;
+    const double share = imm_.probability(static_cast<Eigen::Index>(i));
+    mean.innovation.nis += share * innovation.nis;
+    mean.innovation.variance += share * innovation.variance;
+    mean.difference += share * m.innovation;
   }
-  return nis;
+  return mean;
+}
+
+void Fusion::tell(const Innovation<3>& innovation, const Eigen::Vector3d& difference, ChannelReport& report) {
+  report.nis = innovation.nis;
+  report.dof = 3;
+  report.innovation = difference;
+  report.innovation_variance = innovation.variance;
 }
 
 /// Motion since the last use. Where the INS corrected itself in between, its velocities tell the motion without the
@@ -54,7 +58,7 @@ double Fusion::update(const At& at) {
 Planar Fusion::motion_of(const ChannelSample& s, const Odometry& last) const {
   const Planar motion = motion_between(planar_pose(last), planar_pose(s.odometry));
   if (s.channel != FusionChannel::kIns) return motion;
-  const Planar felt = motion_by_velocity(last, s.odometry);
+  const Planar felt = motion_by_velocity(last, s.odometry).way;
   const double tolerance = config_.jump_tolerance;
   const bool jumped = (motion - felt).head<2>().norm() > tolerance || std::abs(motion.z() - felt.z()) > 0.2 * tolerance;
   return ins_corrected_ || jumped ? felt : motion;
@@ -102,11 +106,6 @@ void Fusion::follow_velocity_error(const Odometry& ins) {
 FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
   Memory& m = memory(s.channel);
   m.shares_imu = s.shares_imu;
-  // Wheels and imu are in the INS already.
-  if (s.channel == FusionChannel::kWheel && alive(FusionChannel::kIns)) {
-    m.last.reset();
-    return FuseStatus::kDisabled;
-  }
   if (m.last && m.reset_counter != s.reset_counter) {
     m.last.reset();
     if (s.channel == FusionChannel::kVo) {
@@ -144,15 +143,13 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
   const ChannelSlots where = slots(s.channel);
   if (s.channel == FusionChannel::kVo) {
     const Measurement<3> at = relative_motion(now_.x, where, motion, dt, R);
-    const double distance = squared_distance<3>(now_, at.H, at.innovation, at.R);
-    compare(agreement_, config_.agreement, distance);
-    report.nis = distance;
-    report.dof = 3;
+    tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
+    compare(agreement_, config_.agreement, report.nis);
     if (!agreement_.agrees) ask_restart("vision disagrees with wheels and imu");
-    if (!agreement_.agrees || distance > config_.gate) return FuseStatus::kGated;
+    if (!agreement_.agrees || report.nis > config_.gate) return FuseStatus::kGated;
   }
-  report.nis = update<3>([&](const Vector& x) { return relative_motion(x, where, motion, dt, R); });
-  report.dof = 3;
+  const Mean<3> used = update<3>([&](const Vector& x) { return relative_motion(x, where, motion, dt, R); });
+  tell(used.innovation, used.difference, report);
   return FuseStatus::kAccepted;
 }
 
@@ -183,8 +180,7 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, ChannelReport& report) {
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
   const Measurement<3> plain = absolute_pose(now_.x, pose, P_pose);
-  report.nis = squared_distance<3>(now_, plain.H, plain.innovation, plain.R);
-  report.dof = 3;
+  tell(judge<3>(now_, plain.H, plain.innovation, plain.R), plain.innovation, report);
   FuseStatus status = FuseStatus::kAccepted;
   if (report.nis > config_.gate) {
     refuse_fix(comeback_);
@@ -255,8 +251,7 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
   const Eigen::Matrix3d R = scaled_and_clipped(planar_covariance(o), report.alpha, c);
   const Planar pose = planar_pose(o);
   const Measurement<3> at = absolute_pose(now_.x, pose, R);
-  report.nis = squared_distance<3>(now_, at.H, at.innovation, at.R);
-  report.dof = 3;
+  tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
   report.gate = c.gate;
   add_nis(m.check, c, report.nis, 3);
   if (report.nis > c.gate) return FuseStatus::kGated;
@@ -274,7 +269,6 @@ void Fusion::remember(const ChannelSample& s) {
   Memory& m = memory(s.channel);
   m.reset_counter = s.reset_counter;
   if (s.channel == FusionChannel::kIns || !alive(FusionChannel::kIns)) attitude_ = s.odometry;
-  if (s.channel == FusionChannel::kWheel && alive(FusionChannel::kIns)) return;
   m.last = s.odometry;
   for (Mode& mode : imm_.modes) clone_pose(mode.estimate, slots(s.channel).clone);
 }

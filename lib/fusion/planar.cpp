@@ -8,6 +8,10 @@
 namespace roadfix {
 namespace {
 
+constexpr double kLocalFloor = 1e-5;   ///< m and rad, of one motion
+constexpr double kHeightShare = 0.01;  ///< of the way: what a height loses by it, at least
+constexpr double kHeightFloor = 0.01;  ///< m per sqrt(s)
+
 Eigen::Matrix2d rotation(double yaw) { return Eigen::Rotation2Dd(yaw).toRotationMatrix(); }
 
 }  // namespace
@@ -23,6 +27,15 @@ Eigen::Matrix3d planar_covariance(const Odometry& o) {
   J(2, 4) = std::sin(a.roll) / std::cos(a.pitch);
   J(2, 5) = std::cos(a.roll) / std::cos(a.pitch);
   return J * o.cov_pose * J.transpose();
+}
+
+Odometry in_other_frame(const SE3& T_other_frame, const Odometry& o) {
+  Odometry moved = o;
+  moved.T_frame_vehicle = T_other_frame * o.T_frame_vehicle;
+  Matrix6d J = Matrix6d::Identity();
+  J.topLeftCorner<3, 3>() = T_other_frame.R();
+  moved.cov_pose = J * o.cov_pose * J.transpose();
+  return moved;
 }
 
 Planar motion_between(const Planar& a, const Planar& b) {
@@ -71,7 +84,27 @@ Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, c
   return unit * solver.eigenvectors() * kept.asDiagonal() * solver.eigenvectors().transpose() * unit;
 }
 
-Planar motion_by_velocity(const Odometry& a, const Odometry& b) {
+PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
+                           const Eigen::Matrix3d& P_end) {
+  const Eigen::Matrix3d R =
+      motion_covariance(start.pose, start.P, motion, P_end, Eigen::Vector3d::Constant(kLocalFloor));
+  const Eigen::Matrix3d carry = after_motion_by_start(other.pose, motion);
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  turn.topLeftCorner<2, 2>() = rotation(other.pose.z());
+  return {after_motion(other.pose, motion), carry * other.P * carry.transpose() + turn * R * turn.transpose()};
+}
+
+double height_growth(double way, double dt) {
+  const double sigma = kHeightFloor * std::sqrt(dt) + kHeightShare * way;
+  return sigma * sigma;
+}
+
+double level_turn(const Odometry& o) {
+  const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
+  return (o.angular_rate.y() * std::sin(a.roll) + o.angular_rate.z() * std::cos(a.roll)) / std::cos(a.pitch);
+}
+
+FeltMotion motion_by_velocity(const Odometry& a, const Odometry& b) {
   const double dt = seconds_between(a.t_us, b.t_us);
   const double turn = 0.5 * (a.angular_rate.z() + b.angular_rate.z()) * dt;
   // Both velocities in a's level axes; b's axes are turned by what the rates say, not by b's corrected attitude.
@@ -79,7 +112,7 @@ Planar motion_by_velocity(const Odometry& a, const Odometry& b) {
   const Eigen::Vector3d v_a = quaternion({0.0, from.pitch, from.roll}) * a.velocity;
   const Eigen::Vector3d v_b = quaternion({turn, to.pitch, to.roll}) * b.velocity;
   const Eigen::Vector3d d = 0.5 * dt * (v_a + v_b);
-  return {d.x(), d.y(), turn};
+  return {{d.x(), d.y(), turn}, d.z()};
 }
 
 }  // namespace roadfix

@@ -14,6 +14,9 @@ Planar planar_pose(const Odometry& odometry);
 /// Its covariance from the 6x6 pose covariance: yaw's error is that of the rotation about the level frame's z.
 Eigen::Matrix3d planar_covariance(const Odometry& odometry);
 
+/// The same pose in another frame.
+Odometry in_other_frame(const SE3& T_other_frame, const Odometry& odometry);
+
 /// Motion from a to b in a's axes: forward, left, turn.
 Planar motion_between(const Planar& a, const Planar& b);
 /// The pose reached from a by a motion in a's axes.
@@ -32,7 +35,25 @@ Eigen::Matrix3d after_motion_by_start(const Planar& a, const Planar& motion);
 Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, const Planar& motion,
                                   const Eigen::Matrix3d& P_b, const Eigen::Vector3d& floor_sigma);
 
-/// Motion from a to b by the mean of the velocities: for a step in which the estimator corrected itself.
-Planar motion_by_velocity(const Odometry& a, const Odometry& b);
+struct PlanarEstimate {
+  Planar pose = Planar::Zero();
+  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
+};
+/// `other`, a pose of the same vehicle in another frame, after the motion that took `start` to a covariance P_end.
+PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
+                           const Eigen::Matrix3d& P_end);
+
+/// Least variance that a height gains on a way, m2.
+double height_growth(double way, double dt);
+
+/// Yaw rate of the level axes.
+double level_turn(const Odometry& odometry);
+
+/// Motion from a to b by the mean of the velocities, and the rise: for a step in which the estimator corrected itself.
+struct FeltMotion {
+  Planar way = Planar::Zero();
+  double rise = 0.0;  ///< m
+};
+FeltMotion motion_by_velocity(const Odometry& a, const Odometry& b);
 
 }  // namespace roadfix

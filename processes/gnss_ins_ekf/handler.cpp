@@ -1,11 +1,11 @@
 #include "gnss_ins_ekf/handler.h"
 
-#include <cmath>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/mag_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
 #include "bus/message.h"
+#include "bus/publish_slot.h"
 #include "bus/sample_codec.h"
 #include "config/config.h"
 #include "geometry/frames.h"
@@ -21,24 +21,6 @@ constexpr double kMicrotesla = 1e-6;
 
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
-
-/// At most one per period of data time.
-class Slot {
- public:
-  explicit Slot(double period_s) : period_us_(static_cast<int64_t>(std::llround(period_s * 1e6))) {}
-  bool due(int64_t utime) {
-    const int64_t slot = period_us_ > 0 ? utime / period_us_ : utime;
-    if (slot == last_) return false;
-    last_ = slot;
-    return true;
-  }
-  [[nodiscard]] int64_t last() const { return last_; }
-  void set_last(int64_t last) { last_ = last; }
-
- private:
-  int64_t period_us_;
-  int64_t last_ = -1;
-};
 
 class GnssInsStage final : public Stage {
  public:
@@ -128,7 +110,7 @@ class GnssInsStage final : public Stage {
   GnssInsConfig filter_config_;
   StageSpec spec_;
   std::optional<GnssIns> filter_;
-  Slot pose_slot_, status_slot_;
+  PublishSlot pose_slot_, status_slot_;
 };
 
 template <class T>

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "gnss_ins_ekf/handler.h"
+#include "imm_fusion/handler.h"
 #include "wheel_odometry/handler.h"
 
 namespace roadfix {
@@ -20,6 +21,7 @@ const std::vector<KnownStage>& known_stages() {
   static const std::vector<KnownStage> kStages = {
       {"gnss_ins_ekf", [](const std::filesystem::path& dir) { return make_gnss_ins_ekf(dir); }},
       {"wheel_odometry", [](const std::filesystem::path& dir) { return make_wheel_odometry(dir); }},
+      {"imm_fusion", [](const std::filesystem::path& dir) { return make_imm_fusion(dir); }},
   };
   return kStages;
 }

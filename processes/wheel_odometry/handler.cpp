@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "bus/message.h"
+#include "bus/publish_slot.h"
 #include "bus/sample_codec.h"
 #include "config/config.h"
 #include "geometry/frames.h"
@@ -51,7 +52,7 @@ class WheelOdometryStage final : public Stage {
   WheelOdometryStage(const Calibration& calibration, const WheelOdometryConfig& config)
       : config_(config),
         on_rear_axle_(calibration.body_origin == BodyOrigin::kRearAxle),
-        period_us_(static_cast<int64_t>(std::llround(config.publish_period * 1e6))),
+        slot_(config.publish_period),
         odometry_({wheel_sensors(calibration), config.odometry}) {
     spec_.name = "wheel_odometry";
     spec_.inputs = {{"IMU", "imu_t", 0, 0}, {"WHEELS", "wheels_t", 50'000, 0}, {"MAG", "mag_t", 50'000, 0}};
@@ -69,9 +70,7 @@ class WheelOdometryStage final : public Stage {
   void on_clock(const Message& message) override { ahead_.push_back({message.utime, sample_of(message)}); }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
-    const int64_t slot = period_us_ > 0 ? now_utime / period_us_ : now_utime;
-    if (slot == last_slot_) return;
-    last_slot_ = slot;
+    if (!slot_.due(now_utime)) return;
     WheelOdometry now = odometry_;
     for (const Ahead& a : ahead_) add(now, a.sample);
     const WheelReport report = now.report();
@@ -94,7 +93,7 @@ class WheelOdometryStage final : public Stage {
 
   [[nodiscard]] std::vector<uint8_t> save() const override {
     StateWriter writer;
-    writer.put(last_slot_);
+    writer.put(slot_.last());
     odometry_.save(writer);
     return writer.take();
   }
@@ -106,7 +105,7 @@ class WheelOdometryStage final : public Stage {
     loaded.load(reader);
     reader.finish();
     odometry_ = loaded;
-    last_slot_ = slot;
+    slot_.set_last(slot);
     ahead_.clear();
   }
 
@@ -125,11 +124,10 @@ class WheelOdometryStage final : public Stage {
 
   WheelOdometryConfig config_;
   bool on_rear_axle_;
-  int64_t period_us_;
+  PublishSlot slot_;
   StageSpec spec_;
   WheelOdometry odometry_;  ///< at the horizon
   std::deque<Ahead> ahead_;
-  int64_t last_slot_ = -1;
 };
 
 template <class T>

@@ -15,7 +15,7 @@ url='udpm://239.255.76.67:7667?ttl=0'
 "$bin/roadfix" log cut "$log" --to-s "$seconds" --out "$folder/cut.lcm" >/dev/null
 lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/null 2>&1 & logger=$!
 stages=()
-for name in wheel_odometry gnss_ins_ekf; do
+for name in wheel_odometry gnss_ins_ekf imm_fusion; do
   "$bin/$name" --config "$config" --bus "$url" 2>>"$folder/stages.err" & stages+=($!)
 done
 sleep 1

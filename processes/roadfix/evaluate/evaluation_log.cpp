@@ -8,7 +8,7 @@
 #include "bus/message.h"
 #include "bus/schema.h"
 #include "config/config.h"
-#include "geodesy/enu_anchor.h"
+#include "geodesy/enu_change.h"
 #include "geometry/frames.h"
 #include "roadfix/config_t.hpp"
 
@@ -41,18 +41,6 @@ Odometry odometry_of(const pose_t& m) {
 
 bool finite(const Odometry& pose) {
   return pose.T_frame_vehicle.p.allFinite() && pose.T_frame_vehicle.q.coeffs().allFinite();
-}
-
-/// Coordinates of one ENU frame in another, exact at any distance.
-SE3 T_to_from(const Geodetic& to, const Geodetic& from) {
-  const EnuAnchor a(to);
-  const EnuAnchor b(from);
-  return {Eigen::Quaterniond(Eigen::Matrix3d(a.R_ecef_enu().transpose() * b.R_ecef_enu())).normalized(),
-          a.R_ecef_enu().transpose() * (b.p_ecef_enu() - a.p_ecef_enu())};
-}
-
-bool same(const Geodetic& a, const Geodetic& b) {
-  return a.latitude == b.latitude && a.longitude == b.longitude && a.height == b.height;
 }
 
 void transform(const SE3& T, Odometry& pose) { pose = transformed({1.0, T}, pose); }
@@ -102,8 +90,8 @@ class StreamBuilder {
  private:
   void to_first_anchor(const Geodetic& anchor, Odometry& pose) {
     if (!stream_.anchor) stream_.anchor = last_anchor_ = anchor;
-    if (same(anchor, *stream_.anchor)) return;
-    if (!same(anchor, last_anchor_)) T_first_last_ = T_to_from(*stream_.anchor, last_anchor_ = anchor);
+    if (same_anchor(anchor, *stream_.anchor)) return;
+    if (!same_anchor(anchor, last_anchor_)) T_first_last_ = T_enu_enu(*stream_.anchor, last_anchor_ = anchor);
     transform(T_first_last_, pose);
   }
 
@@ -207,8 +195,8 @@ EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::
 }
 
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {
-  if (!stream.anchor || stream.local_frame || same(*stream.anchor, anchor)) return;
-  const SE3 T = T_to_from(anchor, *stream.anchor);
+  if (!stream.anchor || stream.local_frame || same_anchor(*stream.anchor, anchor)) return;
+  const SE3 T = T_enu_enu(anchor, *stream.anchor);
   for (Odometry& pose : stream.trajectory.poses) transform(T, pose);
   stream.anchor = anchor;
 }

@@ -133,7 +133,7 @@ TEST_CASE("velocities tell the motion without the jump") {
   a.T_frame_vehicle.q = quaternion({0.3, 0.0, 0.0});
   b.T_frame_vehicle.p = Eigen::Vector3d(7.0, 7.0, 0.0);  // wherever a fix took it
   b.T_frame_vehicle.q = quaternion({1.0, 0.0, 0.0});
-  const Planar m = motion_by_velocity(a, b);
+  const Planar m = motion_by_velocity(a, b).way;
   CHECK(m.x() == Approx(1.0).epsilon(1e-3));
   CHECK(m.y() == Approx(0.01).epsilon(1e-2));
   CHECK(m.z() == Approx(0.02));

@@ -1,0 +1,198 @@
+#include "imm_fusion/handler.h"
+
+#include <array>
+#include <roadfix/ins_status_t.hpp>
+#include <roadfix/vo_status_t.hpp>
+
+#include "bus/message.h"
+#include "bus/publish_slot.h"
+#include "config/config.h"
+#include "fusion/outlook.h"
+#include "geodesy/enu_change.h"
+#include "imm_fusion/messages.h"
+
+namespace roadfix {
+
+namespace {
+
+// A status comes before the pose that it is about.
+enum Input { kInsStatus = 0, kPoseIns = 1, kVoStatus = 2, kPoseVo = 3, kPoseWheel = 4 };
+enum Output { kFused = 0, kLocal = 1, kState = 2, kAiding = 3, kRestart = 4 };
+
+FusionChannel channel_of(int input) {
+  if (input == kPoseIns) return FusionChannel::kIns;
+  return input == kPoseVo ? FusionChannel::kVo : FusionChannel::kWheel;
+}
+
+/// Counts the jumps of a channel: a new run of its publisher is one as well.
+struct JumpCount {
+  int64_t run = 0;
+  int32_t reset_counter = 0;
+  int32_t jumps = 0;
+
+  int32_t after(const pose_t& m) {
+    if (m.run != run || m.reset_counter != reset_counter) ++jumps;
+    run = m.run;
+    reset_counter = m.reset_counter;
+    return jumps;
+  }
+};
+
+class ImmFusionStage final : public Stage {
+ public:
+  explicit ImmFusionStage(const ImmFusionConfig& config)
+      : config_(config), fusion_(config.fusion), pose_slot_(config.publish_period), state_slot_(config.state_period) {
+    spec_.name = "imm_fusion";
+    spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0},
+                    {"POSE_INS", "pose_t", 0, 0},
+                    {"VO_STATUS", "vo_status_t", 200'000, 0},
+                    {"POSE_VO", "pose_t", 200'000, 0},
+                    {"POSE_WHEEL", "pose_t", 50'000, 0}};
+    spec_.clocks = {{kPoseIns, 300'000}, {kPoseVo, 600'000}, {kPoseWheel, 300'000}};
+    spec_.outputs = {{"POSE_FUSED", "pose_t"},
+                     {"POSE_LOCAL", "pose_t"},
+                     {"FUSION_STATE", "fusion_state_t"},
+                     {"AIDING_FUSION", "aiding_t"},
+                     {"VO_RESTART", "vo_restart_t"}};
+  }
+
+  [[nodiscard]] const StageSpec& spec() const override { return spec_; }
+
+  void apply(const Message& m) override {
+    outlook_.drop_until(m.utime);
+    switch (m.input) {
+      case kInsStatus:
+        fusion_.set_gnss(m.utime, (decode<ins_status_t>(m.bytes).aided_by & ins_status_t::AIDED_GNSS_POSITION) != 0);
+        break;
+      case kVoStatus:
+        vo_shares_imu_ = decode<vo_status_t>(m.bytes).mode == vo_status_t::MODE_MSCKF;
+        break;
+      default:
+        fuse(channel_of(m.input), decode<pose_t>(m.bytes));
+        break;
+    }
+  }
+
+  void on_clock(const Message& m) override {
+    outlook_.see(channel_sample(channel_of(m.input), decode<pose_t>(m.bytes), m.seq));
+  }
+
+  void publish(int64_t now_utime, Outputs& outputs) override {
+    for (aiding_t& record : aidings_) outputs.publish(kAiding, record);
+    aidings_.clear();
+    if (const std::optional<VisionRestart> restart = fusion_.take_restart()) {
+      vo_restart_t message = vo_restart(*restart);
+      outputs.publish(kRestart, message);
+    }
+    if (pose_slot_.due(now_utime)) publish_poses(outputs);
+    if (state_slot_.due(now_utime)) {
+      fusion_state_t message = fusion_state(fusion_);
+      outputs.publish(kState, message);
+    }
+  }
+
+  void digest(Digest& digest) const override {
+    digest.add(fusion_.imm().probability);
+    for (const Mode& mode : fusion_.imm().modes) {
+      digest.add(mode.estimate.x);
+      digest.add(mode.estimate.P);
+    }
+  }
+
+  [[nodiscard]] std::vector<uint8_t> save() const override {
+    StateWriter writer;
+    for (const PublishSlot* slot : {&pose_slot_, &state_slot_}) writer.put(slot->last());
+    for (const JumpCount& c : counts_) {
+      writer.put(c.run);
+      writer.put(c.reset_counter);
+      writer.put(c.jumps);
+    }
+    writer.put(vo_shares_imu_);
+    writer.put(origin_);
+    writer.put(anchor_.has_value());
+    if (anchor_) {
+      for (const double value : {anchor_->latitude, anchor_->longitude, anchor_->height}) writer.put(value);
+    }
+    fusion_.save(writer);
+    outlook_.save(writer);
+    return writer.take();
+  }
+
+  void load(std::span<const uint8_t> state) override {
+    StateReader reader(state);
+    ImmFusionStage loaded(config_);
+    for (PublishSlot* slot : {&loaded.pose_slot_, &loaded.state_slot_}) slot->set_last(reader.get<int64_t>());
+    for (JumpCount& c : loaded.counts_) {
+      reader.get(c.run);
+      reader.get(c.reset_counter);
+      reader.get(c.jumps);
+    }
+    reader.get(loaded.vo_shares_imu_);
+    reader.get(loaded.origin_);
+    if (reader.get<bool>()) {
+      Geodetic& anchor = loaded.anchor_.emplace();
+      for (double* value : {&anchor.latitude, &anchor.longitude, &anchor.height}) reader.get(*value);
+    }
+    loaded.fusion_.load(reader);
+    loaded.outlook_.load(reader);
+    reader.finish();
+    *this = std::move(loaded);
+  }
+
+  [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+
+ private:
+  void fuse(FusionChannel channel, const pose_t& message) {
+    ChannelSample sample = channel_sample(channel, message, message.seq);
+    sample.reset_counter = counts_[static_cast<std::size_t>(channel)].after(message);
+    sample.shares_imu = channel == FusionChannel::kVo && vo_shares_imu_;
+    if (channel == FusionChannel::kIns && sample.odometry.validity != Validity::kInvalid) {
+      to_first_anchor(anchor_of(message), sample.odometry);
+      origin_ = message.origin;
+    }
+    (void)fusion_.add(sample);
+    aidings_.push_back(aiding(sample, fusion_.channel(channel)));
+  }
+
+  /// An INS that starts again may choose another anchor: its poses are taken to the first one's frame.
+  void to_first_anchor(const Geodetic& anchor, Odometry& pose) {
+    if (!anchor_) anchor_ = anchor;
+    if (!same_anchor(anchor, *anchor_)) pose = in_other_frame(T_enu_enu(*anchor_, anchor), pose);
+  }
+
+  void publish_poses(Outputs& outputs) {
+    const Fusion::Poses poses = outlook_.poses(fusion_);
+    const FusionReport report = fusion_.report();
+    pose_t fused{};
+    fill_fused_pose(poses.fused, report, anchor_, fused);
+    fused.origin = origin_;
+    outputs.publish(kFused, fused);
+    pose_t local{};
+    fill_local_pose(poses.local, report, local);
+    local.origin = origin_;
+    outputs.publish(kLocal, local);
+  }
+
+  ImmFusionConfig config_;
+  StageSpec spec_;
+  Fusion fusion_;  ///< at the horizon
+  Outlook outlook_;
+  std::optional<Geodetic> anchor_;
+  int8_t origin_ = pose_t::ORIGIN_IMU;
+  bool vo_shares_imu_ = false;
+  std::array<JumpCount, kFusionChannels> counts_;
+  PublishSlot pose_slot_, state_slot_;
+  std::vector<aiding_t> aidings_;  ///< since the last publish()
+};
+
+}  // namespace
+
+std::unique_ptr<Stage> make_imm_fusion(const ImmFusionConfig& config) {
+  return std::make_unique<ImmFusionStage>(config);
+}
+
+std::unique_ptr<Stage> make_imm_fusion(const std::filesystem::path& vehicle_dir) {
+  return make_imm_fusion(load_config_or_defaults<ImmFusionConfig>(vehicle_dir / "imm_fusion.yaml"));
+}
+
+}  // namespace roadfix

@@ -1,0 +1,7 @@
+#include "bus/run_process.h"
+#include "imm_fusion/handler.h"
+
+int main(int argc, char** argv) {
+  return roadfix::run_process(
+      argc, argv, [](const std::filesystem::path& vehicle_dir) { return roadfix::make_imm_fusion(vehicle_dir); });
+}
