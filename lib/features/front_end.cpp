@@ -3,13 +3,23 @@
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
+#include "features/descriptor_tracks.h"
 #include "features/klt_tracks.h"
 
 namespace roadfix {
 
-std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config, std::span<const uint8_t>) {
-  if (config.kind == FrontEndKind::kKlt) return std::make_unique<KltTracks>(config);
-  throw std::invalid_argument("front end: only klt is built in");
+std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config, std::span<const uint8_t> superpoint_weights) {
+  switch (config.kind) {
+    case FrontEndKind::kOrb:
+      return std::make_unique<DescriptorTracks>(config, make_orb(config));
+    case FrontEndKind::kSift:
+      return std::make_unique<DescriptorTracks>(config, make_sift(config));
+    case FrontEndKind::kSuperPoint:
+      return std::make_unique<DescriptorTracks>(config, make_superpoint(config, superpoint_weights));
+    case FrontEndKind::kKlt:
+      break;
+  }
+  return std::make_unique<KltTracks>(config);
 }
 
 void fix_opencv_threads() { cv::setNumThreads(1); }

@@ -11,6 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "stream/state_bytes.h"
+
 namespace roadfix {
 
 /// One track in one picture.
@@ -77,6 +79,10 @@ class FrontEnd {
 
   /// Forgets pictures and tracks; numbers go on.
   virtual void reset() = 0;
+
+  /// Everything that later tracks depend on, the last picture included.
+  virtual void save(StateWriter& writer) const = 0;
+  virtual void load(StateReader& reader) = 0;
 
   /// Tracks that were looked for in the last picture: what the share of matches is of.
   [[nodiscard]] virtual int num_expected() const = 0;

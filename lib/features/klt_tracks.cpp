@@ -4,11 +4,19 @@
 
 #include "features/corners.h"
 #include "features/flow.h"
+#include "features/saved_features.h"
 
 namespace roadfix {
+namespace {
+
+FlowConfig flow_config(const FrontEndConfig& config) {
+  return {config.klt_window_px, config.klt_levels, config.klt_max_round_trip_px};
+}
+
+}  // namespace
 
 std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Feature> hints) {
-  const FlowConfig flow{config_.klt_window_px, config_.klt_levels, config_.klt_max_round_trip_px};
+  const FlowConfig flow = flow_config(config_);
   std::vector<cv::Mat> pyramid = flow_pyramid(gray, flow);
   num_expected_ = static_cast<int>(live_.size());
   const bool same_size = !pyramid_.empty() && pyramid_.front().size() == gray.size();
@@ -52,6 +60,22 @@ std::vector<Feature> KltTracks::replenish() {
 
 void KltTracks::drop(std::span<const int64_t> tracks) {
   std::erase_if(live_, [&](const Feature& f) { return std::binary_search(tracks.begin(), tracks.end(), f.track); });
+}
+
+void KltTracks::save(StateWriter& writer) const {
+  writer.put(next_track_);
+  writer.put(num_expected_);
+  save_features(live_, writer);
+  save_picture(pyramid_.empty() ? cv::Mat() : pyramid_.front(), writer);
+}
+
+void KltTracks::load(StateReader& reader) {
+  reader.get(next_track_);
+  reader.get(num_expected_);
+  live_ = load_features(reader);
+  const cv::Mat picture = load_picture(reader);
+  pyramid_.clear();
+  if (!picture.empty()) pyramid_ = flow_pyramid(picture, flow_config(config_));
 }
 
 void KltTracks::reset() {

@@ -16,6 +16,8 @@ class KltTracks final : public FrontEnd {
   std::vector<Feature> replenish() override;
   void drop(std::span<const int64_t> tracks) override;
   void reset() override;
+  void save(StateWriter& writer) const override;
+  void load(StateReader& reader) override;
   [[nodiscard]] int num_expected() const override { return num_expected_; }
 
  private:

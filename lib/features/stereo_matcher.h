@@ -32,18 +32,32 @@ void visit(StereoConfig& c, Visitor& v) {
 struct StereoQuery {
   Eigen::Vector2f pixel;        ///< in the left picture
   std::optional<double> depth;  ///< m along the left camera's z, where it is known already
+  int64_t track = 0;            ///< of the feature
 };
 
-class StereoMatcher {
+/// Where the right eye sees what the left one does.
+class RightFinder {
+ public:
+  RightFinder() = default;
+  virtual ~RightFinder() = default;
+  RightFinder(const RightFinder&) = default;
+  RightFinder& operator=(const RightFinder&) = default;
+
+  /// Takes a better estimate of where the right eye is.
+  virtual void turn(const SE3& T_right_left) = 0;
+
+  /// The right pixel of each query, or nothing.
+  [[nodiscard]] virtual std::vector<std::optional<Eigen::Vector2f>> match(
+      const cv::Mat& left, const cv::Mat& right, std::span<const StereoQuery> queries) const = 0;
+};
+
+class StereoMatcher final : public RightFinder {
  public:
   StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left, const StereoConfig& config);
 
-  /// Takes a better estimate of where the right eye is.
-  void turn(const SE3& T_right_left);
-
-  /// The right pixel of each query, or nothing.
+  void turn(const SE3& T_right_left) override;
   [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat& left, const cv::Mat& right,
-                                                                  std::span<const StereoQuery> queries) const;
+                                                                  std::span<const StereoQuery> queries) const override;
 
  private:
   [[nodiscard]] std::optional<Eigen::Vector2f> right_pixel(const Eigen::Vector2d& normalised,

@@ -1,0 +1,37 @@
+/// Descriptor front end: keypoints of each picture matched to the tracks near where these are expected.
+#pragma once
+
+#include "features/keypoints.h"
+
+namespace roadfix {
+
+class DescriptorTracks final : public FrontEnd {
+ public:
+  DescriptorTracks(const FrontEndConfig& config, std::unique_ptr<KeypointDetector> detector)
+      : config_(config), detector_(std::move(detector)) {}
+
+  std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> hints) override;
+  std::vector<Feature> replenish() override;
+  void drop(std::span<const int64_t> tracks) override;
+  void reset() override;
+  void save(StateWriter& writer) const override;
+  void load(StateReader& reader) override;
+  [[nodiscard]] int num_expected() const override { return num_expected_; }
+
+ private:
+  struct Track {
+    Feature feature;     ///< where it was seen last
+    cv::Mat descriptor;  ///< one row, as seen last
+    int missed = 0;      ///< pictures since
+  };
+
+  FrontEndConfig config_;
+  std::unique_ptr<KeypointDetector> detector_;
+  int64_t next_track_ = 1;
+  int num_expected_ = 0;
+  std::vector<Track> live_;  ///< ascending by track
+  Keypoints keypoints_;      ///< of the last picture
+  std::vector<bool> used_;   ///< keypoints that belong to a track
+};
+
+}  // namespace roadfix

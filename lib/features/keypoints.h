@@ -1,0 +1,51 @@
+/// Keypoints with descriptors of one picture: what the descriptor front ends match.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <vector>
+
+#include "features/front_end.h"
+
+namespace roadfix {
+
+struct Keypoints {
+  std::vector<Eigen::Vector2f> pixels;  ///< of the picture as it came
+  std::vector<float> scores;            ///< the higher the better
+  cv::Mat descriptors;                  ///< one row each: CV_8U bits or CV_32F of unit norm
+};
+
+class KeypointDetector {
+ public:
+  KeypointDetector() = default;
+  KeypointDetector(const KeypointDetector&) = delete;
+  KeypointDetector& operator=(const KeypointDetector&) = delete;
+  virtual ~KeypointDetector() = default;
+  virtual Keypoints detect(const cv::Mat& gray) = 0;
+  /// Distance of descriptors above which two are not of one point.
+  [[nodiscard]] virtual double max_distance() const = 0;
+};
+
+/// FAST corners on a pyramid, spread over each level, and BRIEF along the direction of the intensity centroid (Rublee,
+/// Rabaud, Konolige, Bradski, ORB, 2011; the bit pattern is OpenCV's).
+std::unique_ptr<KeypointDetector> make_orb(const FrontEndConfig& config);
+/// Lowe 2004, OpenCV's.
+std::unique_ptr<KeypointDetector> make_sift(const FrontEndConfig& config);
+/// DeTone, Malisiewicz, Rabinovich 2018: a network whose weights the user supplies, as ONNX bytes. Input 1 x 1 x H x W
+/// grey in [0, 1]; outputs `output_det` 1 x 65 x H/8 x W/8 (raw) and `output_desc` 1 x N x H/8 x W/8.
+std::unique_ptr<KeypointDetector> make_superpoint(const FrontEndConfig& config, std::span<const uint8_t> weights);
+
+/// BRIEF of given corners at the picture's own size, without those too near to its edge.
+struct DescribedCorners {
+  std::vector<size_t> index;  ///< into the corners given
+  cv::Mat descriptors;        ///< CV_8U, one row for each
+};
+DescribedCorners describe_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> corners);
+
+/// Hamming distance of bits, Euclidean distance of numbers. Sums run in a fixed order.
+double descriptor_distance(const cv::Mat& a, int row_a, const cv::Mat& b, int row_b);
+
+}  // namespace roadfix

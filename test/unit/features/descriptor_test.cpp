@@ -1,0 +1,135 @@
+/// The descriptor front ends, held to what they share and to how well each can place a track.
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+
+#include "features/front_end.h"
+#include "features/keypoints.h"
+#include "support/pictures.h"
+#include "support/shared_data.h"
+
+namespace roadfix {
+namespace {
+
+using test::shifted;
+using test::texture;
+
+struct Kind {
+  FrontEndKind kind;
+  double median_px;  ///< where half of the tracks must be
+  double share;      ///< of tracks found again
+  size_t least;      ///< tracks begun
+};
+
+std::vector<uint8_t> superpoint_weights() {
+  const auto path = test::shared_path("models/superpoint_student_mbv1.onnx");
+  if (!path) return {};
+  std::ifstream file(*path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+FrontEndConfig config_of(FrontEndKind kind) {
+  FrontEndConfig config;
+  config.kind = kind;
+  return config;
+}
+
+/// Distances of the tracks found again from where they must be after a move of the picture.
+std::vector<float> errors_after_move(FrontEnd& front_end, double du, double dv, size_t& begun_count) {
+  const cv::Mat first = texture(640, 240, 5, 9);
+  CHECK(front_end.track(first, {}).empty());
+  std::map<int64_t, Eigen::Vector2f> begun;
+  for (const Feature& f : front_end.replenish()) begun[f.track] = f.pixel;
+  begun_count = begun.size();
+  const Eigen::Vector2f move(static_cast<float>(du), static_cast<float>(dv));
+  std::vector<float> errors;
+  for (const Feature& f : front_end.track(shifted(first, du, dv), {})) {
+    errors.push_back((f.pixel - begun.at(f.track) - move).norm());
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors;
+}
+
+void check_moves(const Kind& kind, std::span<const uint8_t> weights) {
+  const auto front_end = make_front_end(config_of(kind.kind), weights);
+  size_t begun = 0;
+  const auto errors = errors_after_move(*front_end, 7.25, -3.5, begun);
+  REQUIRE(begun >= kind.least);
+  CHECK(front_end->num_expected() == static_cast<int>(begun));
+  REQUIRE(static_cast<double>(errors.size()) > kind.share * static_cast<double>(begun));
+  CHECK(errors[errors.size() / 2] < static_cast<float>(kind.median_px));
+}
+
+void check_drop_and_state(FrontEndKind kind, std::span<const uint8_t> weights) {
+  const auto front_end = make_front_end(config_of(kind), weights);
+  const cv::Mat picture = texture(640, 240, 5, 9);
+  (void)front_end->track(picture, {});
+  const auto begun = front_end->replenish();
+  REQUIRE(begun.size() > 10);
+  const std::vector<int64_t> dropped{begun[0].track, begun[1].track};
+  front_end->drop(dropped);
+  StateWriter writer;
+  front_end->save(writer);
+  const std::vector<uint8_t> state = writer.take();
+  const auto resumed = make_front_end(config_of(kind), weights);
+  StateReader reader(state);
+  resumed->load(reader);
+  reader.finish();
+  const cv::Mat next = shifted(picture, 3.0, 1.0);
+  const auto a = front_end->track(next, {}), b = resumed->track(next, {});
+  REQUIRE(a.size() == b.size());
+  REQUIRE(!a.empty());
+  for (size_t i = 0; i < a.size(); ++i) {
+    REQUIRE(a[i].track == b[i].track);
+    REQUIRE(a[i].pixel == b[i].pixel);
+    REQUIRE(a[i].track > dropped[1]);
+  }
+  for (const Feature& f : front_end->replenish()) REQUIRE(f.track > begun.back().track);
+  for (int i = 0; i < 4; ++i) CHECK(front_end->track(cv::Mat::zeros(240, 640, CV_8UC1), {}).empty());
+  CHECK(front_end->track(picture, {}).empty());  // after so much darkness all have ended
+}
+
+TEST_CASE("every front end finds moved tracks again") {
+  check_moves({FrontEndKind::kKlt, 0.1, 0.7, 80}, {});
+  check_moves({FrontEndKind::kOrb, 1.0, 0.4, 80}, {});
+  check_moves({FrontEndKind::kSift, 0.5, 0.5, 80}, {});
+}
+
+TEST_CASE("every front end drops, saves and loads alike") {
+  for (const auto kind : {FrontEndKind::kKlt, FrontEndKind::kOrb, FrontEndKind::kSift}) check_drop_and_state(kind, {});
+}
+
+TEST_CASE("superpoint runs on the weights that the user supplies") {
+  const auto weights = superpoint_weights();
+  if (weights.empty()) return;
+  check_moves({FrontEndKind::kSuperPoint, 2.5, 0.3, 10}, weights);  // few corners in a made-up texture
+}
+
+TEST_CASE("superpoint without its weights, or with others, says so") {
+  CHECK_THROWS_AS(make_front_end(config_of(FrontEndKind::kSuperPoint)), std::invalid_argument);
+  const std::vector<uint8_t> junk(100, 7);
+  CHECK_THROWS_AS(make_front_end(config_of(FrontEndKind::kSuperPoint), junk), std::invalid_argument);
+}
+
+TEST_CASE("descriptors of moved corners are near, of others far") {
+  const cv::Mat first = texture(320, 200, 11, 7), second = shifted(first, 5.0, 2.0);
+  std::vector<Eigen::Vector2f> a, b;
+  for (int i = 0; i < 40; ++i) {
+    a.emplace_back(40.0F + 5.0F * static_cast<float>(i), 60.0F + static_cast<float>(i % 7) * 9.0F);
+    b.emplace_back(a.back() + Eigen::Vector2f(5.0F, 2.0F));
+  }
+  a.emplace_back(2.0F, 2.0F);  // too near to the edge
+  const DescribedCorners da = describe_corners(first, a), db = describe_corners(second, b);
+  REQUIRE(da.index.size() == 40);
+  REQUIRE(db.index.size() == 40);
+  double same = 0.0, other = 0.0;
+  for (int i = 0; i < 40; ++i) {
+    same += descriptor_distance(da.descriptors, i, db.descriptors, i) / 40.0;
+    other += descriptor_distance(da.descriptors, i, db.descriptors, (i + 20) % 40) / 40.0;
+  }
+  CHECK(same < 10.0);
+  CHECK(other > 70.0);
+}
+
+}  // namespace
+}  // namespace roadfix
