@@ -131,7 +131,11 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
   }
   report.cost_after = cost_of(problem, &report.error_px);
   const Eigen::MatrixXd cov = equations.covariance();
-  if (num_free > 0) report.cov_last = cov.block<6, 6>(6 * (num_free - 1), 6 * (num_free - 1));
+  if (num_free > 0) {
+    const int row = 6 * (num_free - 1);
+    report.cov_last = cov.block<6, 6>(row, row);
+    report.clustered_cov_last = equations.clustered_covariance(cov).block<6, 6>(row, row);
+  }
   report.lens_cov = cov.bottomRightCorner<LensCorrection::kSize, LensCorrection::kSize>();
   return report;
 }

@@ -49,7 +49,8 @@ struct BundleReport {
   double cost_after = 0.0;
   int iterations = 0;
   std::vector<double> error_px;          ///< one per observation, after; infinite where the point is not in front
-  Matrix6d cov_last = Matrix6d::Zero();  ///< of the last view against the fixed ones
+  Matrix6d cov_last = Matrix6d::Zero();  ///< of the last view against the fixed ones, every error on its own
+  Matrix6d clustered_cov_last = Matrix6d::Zero();  ///< the same for errors that are alike along a track, (M.16)
   LensCorrection::Matrix lens_cov = LensCorrection::Matrix::Zero();
 };
 

@@ -16,6 +16,9 @@ struct CameraRig {
   SE3 T_right_left;
 };
 
+/// Where mono takes its scale from; kAuto: the INS where it knows its speed better than the wheels do.
+enum class ScaleChoice { kAuto, kWheels, kIns, kNone };
+
 struct KeyframeTrackerConfig {
   FrontEndConfig front_end;
   StereoConfig stereo;
@@ -41,6 +44,7 @@ struct KeyframeTrackerConfig {
   // Start without stereo.
   double start_flow_px = 15.0;  ///< median motion since the first picture
   int start_points = 60;        ///< points that the first two keyframes must agree on
+  ScaleChoice scale = ScaleChoice::kAuto;
   // Trust.
   int min_inliers = 15;       ///< fewer: no pose
   int weak_inliers = 35;      ///< fewer: weak
@@ -69,6 +73,11 @@ void visit(KeyframeTrackerConfig& c, Visitor& v) {
   v.number("min_disparity_px", c.min_disparity_px, 0.1, 100.0);
   v.number("start_flow_px", c.start_flow_px, 1.0, 500.0);
   v.integer("start_points", c.start_points, 8, 5000);
+  v.choice("scale", c.scale,
+           {{"auto", ScaleChoice::kAuto},
+            {"wheels", ScaleChoice::kWheels},
+            {"ins", ScaleChoice::kIns},
+            {"none", ScaleChoice::kNone}});
   v.integer("min_inliers", c.min_inliers, 6, 1000);
   v.integer("weak_inliers", c.weak_inliers, 6, 1000);
   v.number("weak_ratio", c.weak_ratio, 0.0, 1.0);

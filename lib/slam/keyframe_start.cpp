@@ -21,7 +21,11 @@ void KeyframeTracker::start_stereo(const CameraFrame& frame) {
 }
 
 void KeyframeTracker::begin_map(int64_t t_us) {
-  if (t_good_us_) {
+  if (t_good_us_) {  // after a loss: the way that nobody saw is missing
+    const double unseen_s = seconds_between(*t_good_us_, t_us);
+    const double unseen =
+        motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s * unseen_s : 0.0;
+    cov_keyframe_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
     ++out_.reset_counter;
     out_.reset_delta = SE3{};
   }
@@ -50,8 +54,6 @@ void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Fe
   for (const Feature& f : all) {
     if (const auto normalised = left_.unproject(f.pixel.cast<double>())) start_->seen[f.track] = *normalised;
   }
-  travelled_ = travelled_variance_ = 0.0;
-  travel_known_ = false;
 }
 
 void KeyframeTracker::start_mono(const CameraFrame& frame) {
@@ -87,8 +89,10 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   const auto motion = two_view_motion(pairs.first, pairs.second, config);
   if (!motion) return;
   double baseline = 1.0;  // a unit of our own
-  if (travel_known_) {
-    baseline = std::max(0.01, travelled_);
+  const auto known = camera_travelled(start_->t_us, SE3{}, frame.t_us, motion->T_first_second);
+  if (known) {
+    baseline = std::max(0.01, known->travel.distance);
+    name_scale(*known);
   } else if (motion_ && motion_->dt_s > 0.0) {  // as fast as before the map was lost
     baseline =
         std::max(0.01, motion_->T_before_now.p.norm() / motion_->dt_s * seconds_between(start_->t_us, frame.t_us));
@@ -103,12 +107,10 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
       wrong.push_back(pairs.tracks[i]);
     }
   }
-  map_.add_keyframe({0, start_->t_us, T_map_camera_, {}, 0.0}, first);
+  map_.add_keyframe({0, start_->t_us, T_map_camera_, {}}, first);
   const SE3 T_map_second = T_map_camera_ * SE3{motion->T_first_second.q, baseline * motion->T_first_second.p};
-  constexpr double kScaleHold = 1e-3;  // of the baseline: the first distance is the unit
-  map_.add_keyframe({0, frame.t_us, T_map_second, baseline, kScaleHold * baseline}, second);
+  map_.add_keyframe({0, frame.t_us, T_map_second, baseline}, second);
   front_end_->drop(wrong);
-  travelled_ = travelled_variance_ = 0.0;
   landmarks_at_keyframe_ = count_landmarks(second);
   out_.num_landmarks_seen = landmarks_at_keyframe_;
   begin_bundle();

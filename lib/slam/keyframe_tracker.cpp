@@ -29,18 +29,46 @@ Matrix6d carried(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_befo
   return F * cov * F.transpose();
 }
 
+/// Places of descriptors are coarser than optical flow's: pixels of a pyramid level, cells of a network.
+double noise_of(const FrontEndConfig& front_end) {
+  switch (front_end.kind) {
+    case FrontEndKind::kOrb:
+      return 2.0;
+    case FrontEndKind::kSift:
+      return 1.25;
+    case FrontEndKind::kSuperPoint:
+      return 1.25 / front_end.superpoint_scale;
+    case FrontEndKind::kKlt:
+      break;
+  }
+  return 1.0;
+}
+
+/// The configuration with its pixel noise as this front end has it.
+KeyframeTrackerConfig fitted(KeyframeTrackerConfig config) {
+  const double noise = noise_of(config.front_end);
+  config.sigma_px *= noise;
+  config.gate_px *= noise;
+  return config;
+}
+
 }  // namespace
 
 KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig,
-                                 std::unique_ptr<FrontEnd> front_end, Executor& executor)
-    : config_(config),
+                                 std::unique_ptr<FrontEnd> front_end, Executor& executor,
+                                 std::unique_ptr<RightFinder> right_finder)
+    : config_(fitted(config)),
       rig_(rig),
       left_(rig.left),
       front_end_(std::move(front_end)),
       executor_(executor),
-      map_(rig, config),
+      map_(rig, config_),
       T_map_camera_(rig.T_vehicle_left) {
-  if (rig.right) stereo_.emplace(left_, Camera(*rig.right), rig.T_right_left, config.stereo);
+  if (!rig.right) return;
+  stereo_ = std::move(right_finder);
+  if (!stereo_) {
+    stereo_ = std::make_unique<StereoMatcher>(left_, Camera(*rig.right), rig.T_right_left, config.stereo);
+  }
 }
 
 KeyframeTracker::~KeyframeTracker() { executor_.wait(); }
@@ -48,14 +76,17 @@ KeyframeTracker::~KeyframeTracker() { executor_.wait(); }
 const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   if (t_us_ && frame.t_us <= *t_us_) return out_;
   finish_bundle();
+  take_speeds();
   TrackedFrame fresh;
   fresh.reset_counter = out_.reset_counter;
   fresh.reset_delta = out_.reset_delta;
   fresh.odometry.t_us = frame.t_us;
   out_ = std::move(fresh);
+  if (restarted_) arrive(frame.t_us);
   if (const std::string reason = unusable(frame); !reason.empty()) {
     miss(frame.t_us, reason);
   } else if (!map_.empty()) {
+    take_scale();
     follow(frame);
   } else if (stereo_ && !frame.right.empty()) {
     start_stereo(frame);
@@ -63,21 +94,18 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
     start_mono(frame);
   }
   t_us_ = frame.t_us;
+  out_.scale = stereo_ ? ScaleSource::kStereo : scale_;
+  out_.scale_std = scale_std_;
   out_.num_keyframes = map_.num_keyframes_ever();
   out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
   return out_;
-}
-
-void KeyframeTracker::travelled(double distance, double sigma) {
-  travelled_ += distance;
-  travelled_variance_ += sigma * sigma;
-  travel_known_ = true;
 }
 
 std::string KeyframeTracker::unusable(const CameraFrame& frame) {
   const auto fits = [](const cv::Mat& picture, const CameraIntrinsics& lens) {
     return picture.type() == CV_8UC1 && picture.cols == lens.width && picture.rows == lens.height;
   };
+  if (frame.left.empty()) return "the picture cannot be read";
   if (!fits(frame.left, rig_.left)) return "the picture does not have the size of the calibration";
   if (rig_.right && !frame.right.empty() && !fits(frame.right, *rig_.right)) return "the right picture does not fit";
   cv::Scalar mean, deviation;
@@ -111,6 +139,15 @@ std::vector<Feature> KeyframeTracker::hints(const SE3& T_map_camera) const {
     }
     if (expected && left_.sees(*expected)) out.push_back({track, expected->cast<float>()});
   }
+  // Landmarks that were not found in the last pictures: a descriptor front end may still know them.
+  const size_t seen = out.size();
+  for (const auto& [track, landmark] : map_.landmarks()) {
+    if (!landmark.p_map || pixels_.contains(track) || landmark.sightings.back().keyframe != map_.last().id) continue;
+    const auto expected = appears(T_camera_map * *landmark.p_map);
+    if (expected && left_.sees(*expected)) out.push_back({track, expected->cast<float>()});
+  }
+  std::inplace_merge(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(seen), out.end(),
+                     [](const Feature& a, const Feature& b) { return a.track < b.track; });
   return out;
 }
 
@@ -180,7 +217,6 @@ void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix
     const Eigen::Matrix3d R = o.T_frame_vehicle.R();
     o.cov_velocity = 2.0 / (motion_->dt_s * motion_->dt_s) * R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R;
   }
-  out_.scale = stereo_ ? ScaleSource::kStereo : (travel_known_ ? ScaleSource::kTravel : ScaleSource::kNone);
 }
 
 void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
@@ -228,7 +264,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
     const SE3 T_camera_map = T_map_camera_.inverse();
     std::vector<StereoQuery> queries;
     for (const Feature& f : all) {
-      StereoQuery query{f.pixel, {}};
+      StereoQuery query{f.pixel, {}, f.track};
       const Landmark* landmark = map_.find(f.track);
       if (landmark != nullptr && landmark->p_map) {
         const double depth = (T_camera_map * *landmark->p_map).z();
@@ -247,23 +283,21 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
     seen.push_back({all[i].track, *normalised, {}});
     if (right[i]) seen.back().right = right_lens.unproject(right[i]->cast<double>());
   }
-  Keyframe keyframe{0, frame.t_us, T_map_camera_, {}, 0.0};
-  if (travel_known_ && !map_.empty()) {
-    keyframe.travelled = travelled_;
-    keyframe.travelled_sigma = std::sqrt(travelled_variance_);
-  }
+  const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}};
   if (!map_.empty()) {
     const SE3& T_map_before = map_.last().T_map_camera;
     cov_keyframe_ = carried(cov_keyframe_, T_map_before, T_map_before.inverse() * T_map_camera_);
   }
   map_.add_keyframe(keyframe, seen);
-  travelled_ = travelled_variance_ = 0.0;
   landmarks_at_keyframe_ = count_landmarks(seen);
   begin_bundle();
 }
 
 void KeyframeTracker::begin_bundle() {
-  job_ = std::make_unique<BundleJob>(map_.make_bundle());
+  job_ = std::make_unique<BundleJob>(map_.make_bundle([this](const Keyframe& a, const Keyframe& b) {
+    const auto known = stereo_ ? std::nullopt : camera_travelled(a.t_us, a.T_map_camera, b.t_us, b.T_map_camera);
+    return known ? std::optional(known->travel) : std::nullopt;
+  }));
   BundleJob* job = job_.get();
   const int iterations = config_.bundle_iterations;
   executor_.start([job, iterations] { job->report = adjust(job->problem, iterations); });
@@ -302,18 +336,6 @@ void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
   front_end_->reset();
   pixels_.clear();
   start_.reset();
-}
-
-void KeyframeTracker::restart(const SE3& T_local_vehicle, const Matrix6d& cov_pose) {
-  finish_bundle();
-  map_.clear();
-  front_end_->reset();
-  pixels_.clear();
-  start_.reset();
-  motion_.reset();
-  T_map_camera_ = T_local_vehicle * rig_.T_vehicle_left;
-  cov_keyframe_ = cov_pose;
-  ++out_.reset_counter;
 }
 
 }  // namespace roadfix

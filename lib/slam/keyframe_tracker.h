@@ -18,6 +18,8 @@
 #include "slam/executor.h"
 #include "slam/local_map.h"
 #include "slam/pose_solver.h"
+#include "slam/travel.h"
+#include "stream/digest.h"
 
 namespace roadfix {
 
@@ -28,7 +30,7 @@ struct CameraFrame {
 };
 
 enum class TrackState { kInitialising, kGood, kWeak, kLost, kRelocalised };
-enum class ScaleSource { kNone, kStereo, kTravel };
+enum class ScaleSource { kNone, kStereo, kWheels, kIns };
 enum class FeatureUse : int8_t { kNew, kMatched, kInlier, kOutlier };
 
 struct UsedFeature {
@@ -42,8 +44,9 @@ struct TrackedFrame {
   TrackState state = TrackState::kInitialising;
   std::string reason;  ///< plain words, empty when good
   ScaleSource scale = ScaleSource::kNone;
-  int reset_counter = 0;  ///< +1 per jump of the pose
-  SE3 reset_delta;        ///< of the last jump: p is new minus old, q is q_old^-1 q_new
+  double scale_std = 0.0;  ///< relative, common to the whole way; meaningless where the source is none
+  int reset_counter = 0;   ///< +1 per jump of the pose
+  SE3 reset_delta;         ///< of the last jump: p is new minus old, q is q_old^-1 q_new
   std::vector<UsedFeature> features;
   int num_expected = 0;  ///< tracks looked for
   int num_matches = 0;   ///< tracks found again
@@ -55,25 +58,43 @@ struct TrackedFrame {
   int64_t num_landmarks = 0;
 };
 
+/// A pose from which to start again.
+struct Restart {
+  int64_t t_us = 0;  ///< of the pose; the vehicle goes on from there with the velocity
+  SE3 T_local_vehicle;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, vehicle axes
+  Matrix6d cov_pose = Matrix6d::Zero();
+};
+
 class KeyframeTracker {
  public:
+  /// `right_finder`: for simulated tracks; without it pictures are matched.
   KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig, std::unique_ptr<FrontEnd> front_end,
-                  Executor& executor);
+                  Executor& executor, std::unique_ptr<RightFinder> right_finder = nullptr);
   ~KeyframeTracker();
   KeyframeTracker(const KeyframeTracker&) = delete;
   KeyframeTracker& operator=(const KeyframeTracker&) = delete;
 
-  /// Distance that the vehicle has travelled since the frame before, m, and its standard deviation: from wheels or an
-  /// INS. Gives mono its scale. Call before process() of the frame that it leads to.
-  void travelled(double distance, double sigma);
+  /// A speed of the vehicle from wheels or an INS: gives mono its scale. It counts from the next frame on, for the past
+  /// as well: speeds may come later than the frames of their time.
+  void speed(const SpeedSample& sample) { new_speeds_.push_back(sample); }
 
-  /// Starts again at this pose: the map is forgotten, the next frame has it.
-  void restart(const SE3& T_local_vehicle, const Matrix6d& cov_pose);
+  /// Starts again at this pose: the map is forgotten, the next frame begins there.
+  void restart(const Restart& restart);
 
   /// The next frame; an older or equal time is refused and changes nothing.
   const TrackedFrame& process(const CameraFrame& frame);
 
   [[nodiscard]] const TrackedFrame& last() const { return out_; }
+  /// The last frame's pose carried on to a later time by the last motion; coasting where that is later.
+  [[nodiscard]] Odometry at(int64_t t_us) const;
+
+  /// Everything that later frames depend on. To be called between two frames; after load() the same frames give the
+  /// same bits. load() throws where the bytes are no such state.
+  void save(StateWriter& writer) const;
+  void load(StateReader& reader);
+  void digest(Digest& digest) const;
+
   [[nodiscard]] const LensCorrection& lens() const { return map_.lens(); }
 
  private:
@@ -98,6 +119,20 @@ class KeyframeTracker {
   void begin_start(const CameraFrame& frame, const std::vector<Feature>& features);
   void finish_start(const CameraFrame& frame, const Pairs& pairs);
   void begin_map(int64_t t_us);
+  /// Way of the vehicle, with the source that knows it best; nothing where none does or none is wanted.
+  struct KnownTravel {
+    Travel travel;
+    SpeedSource source = SpeedSource::kWheels;
+  };
+  [[nodiscard]] std::optional<KnownTravel> travelled(int64_t begin_us, int64_t end_us) const;
+  /// The same of the camera, between two of its poses.
+  [[nodiscard]] std::optional<KnownTravel> camera_travelled(int64_t begin_us, const SE3& T_map_begin, int64_t end_us,
+                                                            const SE3& T_map_end) const;
+  void take_speeds();
+  void take_scale();
+  void name_scale(const KnownTravel& known);
+  void forget_map();
+  void arrive(int64_t t_us);
   [[nodiscard]] int count_landmarks(const std::vector<KeyframeFeature>& features) const;
   void follow(const CameraFrame& frame);
   [[nodiscard]] SE3 predict(int64_t t_us) const;
@@ -114,7 +149,7 @@ class KeyframeTracker {
   KeyframeTrackerConfig config_;
   CameraRig rig_;
   Camera left_;
-  std::optional<StereoMatcher> stereo_;
+  std::unique_ptr<RightFinder> stereo_;  ///< null without a right eye
   std::unique_ptr<FrontEnd> front_end_;
   Executor& executor_;
   LocalMap map_;
@@ -128,8 +163,12 @@ class KeyframeTracker {
   std::map<int64_t, Eigen::Vector2f> pixels_;  ///< of the live tracks in the last picture
   int landmarks_at_keyframe_ = 0;
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
-  double travelled_ = 0.0, travelled_variance_ = 0.0;  ///< since the last keyframe
-  bool travel_known_ = false;
+  std::vector<SpeedSample> new_speeds_;
+  TravelHistory wheels_, ins_;
+  ScaleSource scale_ = ScaleSource::kNone;  ///< of the map
+  double scale_std_ = 0.0;
+  bool restarted_ = false;  ///< and no frame since
+  Restart restart_;
 };
 
 }  // namespace roadfix

@@ -4,9 +4,15 @@
 
 #include "geometry/frames.h"
 #include "slam/reprojection.h"
+#include "slam/state_io.h"
 #include "slam/triangulation.h"
 
 namespace roadfix {
+namespace {
+
+constexpr double kMinTravelSigma = 0.005;  ///< m; no speed sensor is better between two pictures
+
+}  // namespace
 
 LocalMap::LocalMap(const CameraRig& rig, const KeyframeTrackerConfig& config)
     : rig_(rig), config_(config), focal_px_(Camera(rig.left).focal()) {
@@ -95,7 +101,7 @@ size_t LocalMap::num_fixed() const {
   return keyframes_.size() > window + 1 ? keyframes_.size() - window : 1;
 }
 
-BundleJob LocalMap::make_bundle() const {
+BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
   BundleJob job;
   BundleProblem& problem = job.problem;
   problem.T_right_left = rig_.T_right_left;
@@ -104,11 +110,18 @@ BundleJob LocalMap::make_bundle() const {
   problem.lens = problem.lens_prior = lens_;
   problem.lens_information = lens_information_;
   const size_t fixed = num_fixed();
-  for (const Keyframe& k : keyframes_) {
-    problem.views.push_back({k.T_map_camera, problem.views.size() < fixed});
+  constexpr double kUnitHold = 1e-3;  // of the distance held: it is exact by definition
+  for (size_t i = 0; i < keyframes_.size(); ++i) {
+    const Keyframe& k = keyframes_[i];
+    problem.views.push_back({k.T_map_camera, i < fixed});
     job.keyframes.push_back(k.id);
-    const int view = static_cast<int>(problem.views.size()) - 1;
-    if (view > 0 && k.travelled) problem.distances.push_back({view - 1, view, *k.travelled, k.travelled_sigma});
+    if (i == 0) continue;
+    const int view = static_cast<int>(i);
+    if (const auto way = travel(keyframes_[i - 1], k)) {
+      problem.distances.push_back({view - 1, view, way->distance, std::max(kMinTravelSigma, way->sigma)});
+    } else if (k.held_distance) {
+      problem.distances.push_back({view - 1, view, *k.held_distance, kUnitHold * *k.held_distance});
+    }
   }
   const int64_t first = keyframes_.front().id, first_free = first + static_cast<int64_t>(fixed);
   for (const auto& [track, landmark] : landmarks_) {
@@ -159,6 +172,65 @@ void LocalMap::learn_lens(const BundleJob& job) {
 
 void LocalMap::forget(std::span<const int64_t> tracks) {
   for (const int64_t track : tracks) landmarks_.erase(track);
+}
+
+void LocalMap::rescale(double factor) {
+  const Eigen::Vector3d centre = keyframes_.back().T_map_camera.p;
+  for (Keyframe& k : keyframes_) {
+    k.T_map_camera.p = centre + factor * (k.T_map_camera.p - centre);
+    if (k.held_distance) k.held_distance = factor * *k.held_distance;
+  }
+  for (auto& [track, landmark] : landmarks_) {
+    if (landmark.p_map) landmark.p_map = centre + factor * (*landmark.p_map - centre);
+  }
+}
+
+void LocalMap::save(StateWriter& writer) const {
+  writer.put(next_id_);
+  writer.put(lens_.value);
+  writer.put(lens_information_);
+  writer.put(static_cast<int64_t>(keyframes_.size()));
+  for (const Keyframe& k : keyframes_) {
+    writer.put(k.id);
+    writer.put(k.t_us);
+    put_pose(k.T_map_camera, writer);
+    put_optional(k.held_distance, writer);
+  }
+  writer.put(static_cast<int64_t>(landmarks_.size()));
+  for (const auto& [track, landmark] : landmarks_) {
+    writer.put(track);
+    put_optional(landmark.p_map, writer);
+    writer.put(static_cast<int64_t>(landmark.sightings.size()));
+    for (const Sighting& s : landmark.sightings) {
+      writer.put(s.keyframe);
+      writer.put(s.left);
+      put_optional(s.right, writer);
+    }
+  }
+}
+
+void LocalMap::load(StateReader& reader) {
+  clear();
+  reader.get(next_id_);
+  reader.get(lens_.value);
+  reader.get(lens_information_);
+  for (auto left = reader.get<int64_t>(); left > 0; --left) {
+    Keyframe& k = keyframes_.emplace_back();
+    reader.get(k.id);
+    reader.get(k.t_us);
+    get_pose(k.T_map_camera, reader);
+    get_optional(k.held_distance, reader);
+  }
+  for (auto left = reader.get<int64_t>(); left > 0; --left) {
+    Landmark& landmark = landmarks_[reader.get<int64_t>()];
+    get_optional(landmark.p_map, reader);
+    for (auto sightings = reader.get<int64_t>(); sightings > 0; --sightings) {
+      Sighting& s = landmark.sightings.emplace_back();
+      reader.get(s.keyframe);
+      reader.get(s.left);
+      get_optional(s.right, reader);
+    }
+  }
 }
 
 void LocalMap::clear() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -9,6 +10,7 @@
 
 #include "slam/bundle.h"
 #include "slam/config.h"
+#include "slam/travel.h"
 
 namespace roadfix {
 
@@ -27,9 +29,8 @@ struct Landmark {
 struct Keyframe {
   int64_t id = 0;
   int64_t t_us = 0;
-  SE3 T_map_camera;                 ///< of the left eye
-  std::optional<double> travelled;  ///< m since the keyframe before, where something other than the pictures says so
-  double travelled_sigma = 0.0;     ///< m
+  SE3 T_map_camera;                     ///< of the left eye
+  std::optional<double> held_distance;  ///< to the keyframe before: a unit of length, where nothing else gives one
 };
 
 /// What a keyframe sees of one track.
@@ -55,9 +56,17 @@ class LocalMap {
   /// left the window. Returns its id.
   int64_t add_keyframe(const Keyframe& keyframe, std::span<const KeyframeFeature> features);
 
-  [[nodiscard]] BundleJob make_bundle() const;
+  /// Way of the camera between two keyframes, m, where something other than the pictures says so.
+  using TravelBetween = std::function<std::optional<Travel>(const Keyframe&, const Keyframe&)>;
+  [[nodiscard]] BundleJob make_bundle(const TravelBetween& travel) const;
   /// Takes the result in; returns the tracks that turned out wrong, ascending, which the map has forgotten.
   std::vector<int64_t> apply(const BundleJob& job);
+
+  /// All lengths times `factor`, the camera of the last keyframe staying where it is.
+  void rescale(double factor);
+
+  void save(StateWriter& writer) const;
+  void load(StateReader& reader);
 
   /// Forgets landmarks (ascending).
   void forget(std::span<const int64_t> tracks);

@@ -12,6 +12,7 @@ NormalEquations::NormalEquations(int num_free_views, size_t num_points)
     : lens_row_(6 * num_free_views),
       H_(Eigen::MatrixXd::Zero(lens_row_ + kLens, lens_row_ + kLens)),
       b_(Eigen::VectorXd::Zero(lens_row_ + kLens)),
+      H_known_(H_),
       points_(num_points) {}
 
 void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual,
@@ -23,37 +24,45 @@ void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobia
   const Eigen::Matrix<double, kLens, 2> Jl = weight * J.correction.transpose();
   p.W_lens.noalias() += Jl * J.point;
   H_.block<kLens, kLens>(lens_row_, lens_row_).noalias() += Jl * J.correction;
+  p.b_lens.noalias() += Jl * residual;
   b_.segment<kLens>(lens_row_).noalias() += Jl * residual;
   if (free_view < 0) return;
   const Eigen::Matrix<double, 6, 2> Jv = weight * J.pose.transpose();
   const int row = 6 * free_view;
   H_.block<6, 6>(row, row).noalias() += Jv * J.pose;
   H_.block<kLens, 6>(lens_row_, row).noalias() += Jl * J.pose;
-  b_.segment<6>(row).noalias() += Jv * residual;
+  const Vector6d b = Jv * residual;
+  b_.segment<6>(row) += b;
   if (p.links_end == links_.size() && p.links_end > 0 && links_.back().free_view == free_view) {
     links_.back().W.noalias() += Jv * J.point;  // the other eye of the same view
+    links_.back().b += b;
   } else {
-    links_.push_back({free_view, Jv * J.point});
+    links_.push_back({free_view, Jv * J.point, b});
     p.links_end = links_.size();
   }
 }
 
 void NormalEquations::add_distance(int free_a, int free_b, const Eigen::Vector3d& J_b, double residual) {
   const Eigen::Matrix3d H = J_b * J_b.transpose();
+  const auto add = [&](int row, int column, double sign) {
+    H_.block<3, 3>(row, column) += sign * H;
+    H_known_.block<3, 3>(row, column) += sign * H;
+  };
   if (free_a >= 0) {
-    H_.block<3, 3>(6 * free_a, 6 * free_a) += H;
+    add(6 * free_a, 6 * free_a, 1.0);
     b_.segment<3>(6 * free_a) -= residual * J_b;
   }
   if (free_b >= 0) {
-    H_.block<3, 3>(6 * free_b, 6 * free_b) += H;
+    add(6 * free_b, 6 * free_b, 1.0);
     b_.segment<3>(6 * free_b) += residual * J_b;
   }
-  if (free_a >= 0 && free_b >= 0) H_.block<3, 3>(6 * std::max(free_a, free_b), 6 * std::min(free_a, free_b)) -= H;
+  if (free_a >= 0 && free_b >= 0) add(6 * std::max(free_a, free_b), 6 * std::min(free_a, free_b), -1.0);
 }
 
 void NormalEquations::add_lens_prior(const LensCorrection::Matrix& information,
                                      const LensCorrection::Vector& residual) {
   H_.block<kLens, kLens>(lens_row_, lens_row_) += information;
+  H_known_.block<kLens, kLens>(lens_row_, lens_row_) += information;
   b_.segment<kLens>(lens_row_) += information * residual;
 }
 
@@ -109,6 +118,40 @@ Eigen::MatrixXd NormalEquations::covariance() const {
   const Reduced r = reduce(0.0);
   const Eigen::Index n = r.S.rows();
   return r.S.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+}
+
+Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& covariance) const {
+  // What is known beside the pictures has the scatter that its information says.
+  Eigen::MatrixXd scatter = H_known_;
+  size_t begin = 0, clusters = 0;
+  std::vector<Vector6d> score;
+  for (const Point& point : points_) {
+    const size_t end = std::max(begin, point.links_end);
+    if (end > begin) {
+      ++clusters;
+      Eigen::Matrix3d H = point.H;
+      H.diagonal().array() += kMinPointInformation;
+      const Eigen::Vector3d shift = H.ldlt().solve(point.b);
+      const LensCorrection::Vector lens = point.b_lens - point.W_lens * shift;
+      score.clear();
+      for (size_t i = begin; i < end; ++i) score.emplace_back(links_[i].b - links_[i].W * shift);
+      for (size_t i = begin; i < end; ++i) {
+        const int row = 6 * links_[i].free_view;
+        scatter.block<kLens, 6>(lens_row_, row).noalias() += lens * score[i - begin].transpose();
+        for (size_t j = begin; j <= i; ++j) {
+          scatter.block<6, 6>(row, 6 * links_[j].free_view).noalias() +=
+              score[i - begin] * score[j - begin].transpose();
+        }
+      }
+      scatter.block<kLens, kLens>(lens_row_, lens_row_).noalias() += lens * lens.transpose();
+    }
+    begin = end;
+  }
+  // The fit has taken its own share out of the residuals.
+  const auto n = static_cast<double>(clusters), unknowns = static_cast<double>(scatter.rows());
+  const double shrunk = n > 2.0 * unknowns ? n / (n - unknowns) : 2.0;
+  const Eigen::MatrixXd whole = scatter.selfadjointView<Eigen::Lower>();
+  return shrunk * covariance * whole * covariance;
 }
 
 }  // namespace roadfix

@@ -35,6 +35,11 @@ class NormalEquations {
   /// Inverse of the reduced system: covariance of views and lens, points marginalised, (M.13).
   [[nodiscard]] Eigen::MatrixXd covariance() const;
 
+  /// The same where the errors of one point's sightings are alike and of unknown size, but those of different points
+  /// are not: the score of each point counts as one draw (Liang and Zeger 1986, the sandwich over clusters), (M.16).
+  /// `covariance`: what covariance() gave.
+  [[nodiscard]] Eigen::MatrixXd clustered_covariance(const Eigen::MatrixXd& covariance) const;
+
  private:
   using Matrix63d = Eigen::Matrix<double, 6, 3>;
   using MatrixL3d = Eigen::Matrix<double, LensCorrection::kSize, 3>;
@@ -42,11 +47,13 @@ class NormalEquations {
   struct Link {  ///< between a view and a point
     int free_view = 0;
     Matrix63d W;
+    Vector6d b;  ///< the point's share of the view's right-hand side
   };
   struct Point {
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     MatrixL3d W_lens = MatrixL3d::Zero();
+    LensCorrection::Vector b_lens = LensCorrection::Vector::Zero();  ///< its share of the lens's
     size_t links_end = 0;  ///< its links end here, and begin where the point before has its end
   };
   struct Reduced {
@@ -59,6 +66,7 @@ class NormalEquations {
   int lens_row_;
   Eigen::MatrixXd H_;  ///< of views and lens, lower triangle
   Eigen::VectorXd b_;
+  Eigen::MatrixXd H_known_;  ///< the part of H_ that comes from distances and priors, lower triangle
   std::vector<Point> points_;
   std::vector<Link> links_;
 };

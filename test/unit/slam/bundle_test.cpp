@@ -112,6 +112,45 @@ TEST_CASE("the last view's covariance is that of its errors") {
   CHECK(mean_nees(1.0) > 2.0);  // teeth
 }
 
+/// Errors that are alike along a track: a random walk from sighting to sighting, as a followed patch wanders.
+void let_tracks_wander(Scene& s, unsigned seed, double step_px) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> step(0.0, step_px / kFocal);
+  Eigen::Vector2d walk = Eigen::Vector2d::Zero();
+  int point = -1;
+  for (auto& o : s.problem.observations) {
+    if (o.point != point) walk.setZero();
+    point = o.point;
+    if (!o.right) walk += Eigen::Vector2d(step(random), step(random));
+    o.normalised += walk;
+  }
+}
+
+TEST_CASE("the clustered covariance is that of errors alike along a track, whatever their size") {
+  constexpr int kRuns = 60;
+  struct Nees {
+    double plain = 0.0, clustered = 0.0;
+  };
+  const auto mean_nees = [](double sigma_px, double step_px) {
+    Nees sum;
+    for (unsigned seed = 0; seed < kRuns; ++seed) {
+      Scene s = make_scene(500 + seed, true, sigma_px, 0.02);
+      let_tracks_wander(s, 900 + seed, step_px);
+      const BundleReport report = adjust(s.problem, 15);
+      const Vector6d e = local(s.problem.views.back().T_map_camera, s.true_views.back());
+      sum.plain += e.dot(report.cov_last.ldlt().solve(e)) / (6.0 * kRuns);
+      sum.clustered += e.dot(report.clustered_cov_last.ldlt().solve(e)) / (6.0 * kRuns);
+    }
+    return sum;
+  };
+  const Nees usual = mean_nees(0.5, 0.0), wandering = mean_nees(0.2, 0.7), loud = mean_nees(1.0, 0.0);
+  for (const Nees& nees : {usual, wandering, loud}) {
+    CHECK(nees.clustered > 0.76);  // 99.9 % of 360 degrees of freedom: 0.76 to 1.26
+    CHECK(nees.clustered < 1.35);  // and what 120 clusters leave uncertain of the covariance itself
+  }
+  CHECK(wandering.plain > 2.0);  // teeth: what the covariance of independent errors makes of it
+}
+
 TEST_CASE("a wrong focal length and a turned right eye are found") {
   Scene s = make_scene(9, true, 0.2, 0.0);
   LensCorrection truth;

@@ -80,8 +80,9 @@ TEST_CASE("mono follows the drive up to scale, and to scale where the wheels tel
     SE3 first;
     int first_frame = -1;
     for (int i = 0; i < kFrames; ++i) {
-      if (wheels && i > 0) run.tracker.travelled(0.8, 0.01);
-      const TrackedFrame& out = run.tracker.process(drive()[static_cast<size_t>(i)]);
+      const CameraFrame& frame = drive()[static_cast<size_t>(i)];
+      if (wheels) run.tracker.speed({frame.t_us, SpeedSource::kWheels, 8.0, 0.02, 0.01});
+      const TrackedFrame& out = run.tracker.process(frame);
       if (out.odometry.validity == Validity::kValid && first_frame < 0) {
         first_frame = i;
         first = out.odometry.T_frame_vehicle;
@@ -90,7 +91,7 @@ TEST_CASE("mono follows the drive up to scale, and to scale where the wheels tel
     REQUIRE(first_frame >= 0);
     CHECK(first_frame < 8);
     const TrackedFrame& out = run.tracker.last();
-    CHECK(out.scale == (wheels ? ScaleSource::kTravel : ScaleSource::kNone));
+    CHECK(out.scale == (wheels ? ScaleSource::kWheels : ScaleSource::kNone));
     const Eigen::Vector3d moved = first.q.conjugate() * (out.odometry.T_frame_vehicle.p - first.p);
     const Eigen::Vector3d truth = (true_pose(first_frame).inverse() * true_pose(kFrames - 1)).p;
     CHECK(moved.normalized().dot(truth.normalized()) > 0.9995);
@@ -135,7 +136,7 @@ TEST_CASE("darkness ends in lost within half a second, and a restart takes the p
       CHECK(out.odometry.validity == Validity::kInvalid);
     }
   }
-  run.tracker.restart(true_pose(20), 0.01 * Matrix6d::Identity());
+  run.tracker.restart({drive()[20].t_us, true_pose(20), {0.0, 0.0, 8.0}, 0.01 * Matrix6d::Identity()});
   for (int i = 20; i < kFrames; ++i)
     CHECK(run.tracker.process(drive()[static_cast<size_t>(i)]).state == TrackState::kGood);
   CHECK(run.tracker.last().reset_counter > 0);

@@ -1,0 +1,263 @@
+/// What the tracker keeps between frames: restarts, speeds and the scale they give, saved states.
+#include <cmath>
+
+#include "geometry/so3.h"
+#include "slam/keyframe_tracker.h"
+#include "slam/state_io.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kMinScaleWay = 3.0;  ///< m that a map without scale must have gone before speeds give it one
+
+/// Way of the camera when the vehicle has gone `way` along an arc and the camera turned and moved by T_begin_end, of
+/// which the direction of p counts: |lambda t + w| = chord, w what turning alone moves the vehicle's origin by.
+std::optional<double> camera_way(double way, const SE3& T_begin_end, const Eigen::Vector3d& p_camera_vehicle) {
+  const double half_turn = 0.5 * log_q(T_begin_end.q).norm();
+  const double chord = half_turn > 1e-6 ? way * std::sin(half_turn) / half_turn : way;
+  const double length = T_begin_end.p.norm();
+  if (!(length > 1e-6)) return std::nullopt;
+  const Eigen::Vector3d t = T_begin_end.p / length;
+  const Eigen::Vector3d w = T_begin_end.q * p_camera_vehicle - p_camera_vehicle;
+  const double tw = t.dot(w), square = tw * tw - w.squaredNorm() + chord * chord;
+  if (square < 0.0) return std::nullopt;
+  const double lambda = std::sqrt(square) - tw;
+  return lambda > 0.0 ? std::optional(lambda) : std::nullopt;
+}
+
+}  // namespace
+
+void KeyframeTracker::forget_map() {
+  finish_bundle();
+  map_.clear();
+  front_end_->reset();
+  pixels_.clear();
+  start_.reset();
+}
+
+void KeyframeTracker::restart(const Restart& restart) {
+  forget_map();
+  restart_ = restart;
+  restarted_ = true;
+}
+
+/// The first frame after a restart: the vehicle has moved on from the pose given.
+void KeyframeTracker::arrive(int64_t t_us) {
+  restarted_ = false;
+  const double dt_s = std::max(0.0, seconds_between(restart_.t_us, t_us));
+  SE3 T_local_vehicle = restart_.T_local_vehicle;
+  T_local_vehicle.p += dt_s * (T_local_vehicle.q * restart_.velocity);
+  const SE3 T_old_camera = T_map_camera_;
+  T_map_camera_ = T_local_vehicle * rig_.T_vehicle_left;
+  const SE3 T_old_vehicle = T_old_camera * rig_.T_vehicle_left.inverse();
+  out_.reset_delta = {T_old_vehicle.q.conjugate() * T_local_vehicle.q, T_local_vehicle.p - T_old_vehicle.p};
+  ++out_.reset_counter;
+  // Unseen turning and braking until here, as generous as the ramp of a street corner.
+  constexpr double kTurnRate = 0.2;      // rad/s
+  constexpr double kAcceleration = 1.0;  // m/s2
+  Matrix6d cov = restart_.cov_pose;
+  const double slip = 0.5 * dt_s * dt_s * (kAcceleration + kTurnRate * restart_.velocity.norm());
+  cov.topLeftCorner<3, 3>().diagonal().array() += slip * slip;
+  cov(5, 5) += (kTurnRate * dt_s) * (kTurnRate * dt_s);
+  Matrix6d F = Matrix6d::Identity();
+  F.topRightCorner<3, 3>() = -T_local_vehicle.R() * skew(rig_.T_vehicle_left.p);
+  F.bottomRightCorner<3, 3>() = rig_.T_vehicle_left.R().transpose();
+  cov_keyframe_ = F * cov * F.transpose();
+  const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
+  motion_ = Motion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
+  t_good_us_.reset();
+}
+
+void KeyframeTracker::take_speeds() {
+  for (const SpeedSample& s : new_speeds_) (s.source == SpeedSource::kIns ? ins_ : wheels_).add(s);
+  new_speeds_.clear();
+}
+
+std::optional<KeyframeTracker::KnownTravel> KeyframeTracker::travelled(int64_t begin_us, int64_t end_us) const {
+  std::optional<KnownTravel> best;
+  double best_sigma = 0.0;
+  const auto consider = [&](const TravelHistory& history, SpeedSource source) {
+    const auto way = history.between(begin_us, end_us);
+    if (!way) return;
+    const double sigma = std::hypot(way->sigma, way->scale_std * way->distance);
+    if (best && sigma >= best_sigma) return;
+    best = KnownTravel{*way, source};
+    best_sigma = sigma;
+  };
+  const ScaleChoice scale = config_.scale;
+  if (scale == ScaleChoice::kAuto || scale == ScaleChoice::kWheels) consider(wheels_, SpeedSource::kWheels);
+  if (scale == ScaleChoice::kAuto || scale == ScaleChoice::kIns) consider(ins_, SpeedSource::kIns);
+  return best;
+}
+
+std::optional<KeyframeTracker::KnownTravel> KeyframeTracker::camera_travelled(int64_t begin_us, const SE3& T_map_begin,
+                                                                              int64_t end_us,
+                                                                              const SE3& T_map_end) const {
+  auto known = travelled(begin_us, end_us);
+  if (!known) return known;
+  const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
+  const auto way = camera_way(known->travel.distance, T_map_begin.inverse() * T_map_end, T_camera_vehicle.p);
+  if (!way) return std::nullopt;
+  known->travel.distance = *way;
+  return known;
+}
+
+void KeyframeTracker::name_scale(const KnownTravel& known) {
+  scale_ = known.source == SpeedSource::kIns ? ScaleSource::kIns : ScaleSource::kWheels;
+  scale_std_ = known.travel.scale_std;
+}
+
+/// A map that began without scale gets one where speeds have come since; later ones say where theirs comes from.
+void KeyframeTracker::take_scale() {
+  if (stereo_ || map_.keyframes().size() < 2) return;
+  const Keyframe& newest = map_.last();
+  for (const Keyframe& k : map_.keyframes()) {
+    const double length = (newest.T_map_camera.p - k.T_map_camera.p).norm();
+    const auto known = camera_travelled(k.t_us, k.T_map_camera, newest.t_us, newest.T_map_camera);
+    if (!known || !(length > 0.0)) continue;
+    if (scale_ != ScaleSource::kNone) {
+      name_scale(*known);
+    } else if (known->travel.distance > kMinScaleWay && known->travel.sigma < 0.1 * known->travel.distance) {
+      const double factor = known->travel.distance / length;
+      map_.rescale(factor);
+      if (motion_) motion_->T_before_now.p *= factor;
+      name_scale(*known);
+      ++out_.reset_counter;  // lengths change, the pose itself stays
+      out_.reset_delta = SE3{};
+    }
+    return;
+  }
+}
+
+Odometry KeyframeTracker::at(int64_t t_us) const {
+  Odometry o = out_.odometry;
+  o.t_us = t_us;
+  if (!t_us_ || t_us <= *t_us_ || o.validity == Validity::kInvalid) return o;
+  const double dt_s = seconds_between(*t_us_, t_us);
+  if (dt_s > config_.lost_after_s) {
+    o.validity = Validity::kInvalid;
+    return o;
+  }
+  o.T_frame_vehicle = predict(t_us) * rig_.T_vehicle_left.inverse();
+  constexpr double kUnseen = 1.5;  // m/s2, as in travel.cpp
+  const double slip = 0.5 * kUnseen * dt_s * dt_s;
+  o.cov_pose.topLeftCorner<3, 3>() +=
+      dt_s * dt_s * o.T_frame_vehicle.R() * o.cov_velocity * o.T_frame_vehicle.R().transpose();
+  o.cov_pose.topLeftCorner<3, 3>().diagonal().array() += slip * slip;
+  o.validity = Validity::kCoasting;
+  return o;
+}
+
+void KeyframeTracker::digest(Digest& digest) const {
+  digest.add(T_map_camera_.q.coeffs());
+  digest.add(T_map_camera_.p);
+  digest.add(cov_keyframe_);
+  digest.add(map_.lens().value);
+  digest.add(map_.num_keyframes_ever());
+}
+
+void KeyframeTracker::save(StateWriter& writer) const {
+  front_end_->save(writer);
+  map_.save(writer);
+  writer.put(job_ != nullptr);
+  const Odometry& o = out_.odometry;
+  writer.put(o.t_us);
+  put_pose(o.T_frame_vehicle, writer);
+  for (const Eigen::Vector3d& v : {o.velocity, o.angular_rate}) writer.put(v);
+  writer.put(o.cov_pose);
+  writer.put(o.cov_velocity);
+  writer.put(o.validity);
+  writer.put(out_.state);
+  writer.put(out_.reason);
+  writer.put(out_.reset_counter);
+  put_pose(out_.reset_delta, writer);
+  put_pose(T_map_camera_, writer);
+  put_optional(t_us_, writer);
+  put_optional(t_good_us_, writer);
+  writer.put(motion_.has_value());
+  if (motion_) {
+    put_pose(motion_->T_before_now, writer);
+    writer.put(motion_->dt_s);
+  }
+  writer.put(start_.has_value());
+  if (start_) {
+    writer.put(start_->t_us);
+    writer.put(static_cast<int64_t>(start_->seen.size()));
+    for (const auto& [track, normalised] : start_->seen) {
+      writer.put(track);
+      writer.put(normalised);
+    }
+  }
+  writer.put(static_cast<int64_t>(pixels_.size()));
+  for (const auto& [track, pixel] : pixels_) {
+    writer.put(track);
+    writer.put(pixel);
+  }
+  writer.put(landmarks_at_keyframe_);
+  writer.put(cov_keyframe_);
+  wheels_.save(writer);
+  ins_.save(writer);
+  writer.put(static_cast<int64_t>(new_speeds_.size()));
+  for (const SpeedSample& s : new_speeds_) put_speed(s, writer);
+  writer.put(scale_);
+  writer.put(scale_std_);
+  writer.put(restarted_);
+  writer.put(restart_.t_us);
+  put_pose(restart_.T_local_vehicle, writer);
+  writer.put(restart_.velocity);
+  writer.put(restart_.cov_pose);
+}
+
+void KeyframeTracker::load(StateReader& reader) {
+  executor_.wait();
+  job_.reset();
+  new_speeds_.clear();
+  front_end_->load(reader);
+  map_.load(reader);
+  const bool bundling = reader.get<bool>();
+  out_ = {};
+  Odometry& o = out_.odometry;
+  reader.get(o.t_us);
+  get_pose(o.T_frame_vehicle, reader);
+  reader.get(o.velocity);
+  reader.get(o.angular_rate);
+  reader.get(o.cov_pose);
+  reader.get(o.cov_velocity);
+  reader.get(o.validity);
+  reader.get(out_.state);
+  reader.get(out_.reason);
+  reader.get(out_.reset_counter);
+  get_pose(out_.reset_delta, reader);
+  get_pose(T_map_camera_, reader);
+  get_optional(t_us_, reader);
+  get_optional(t_good_us_, reader);
+  motion_.reset();
+  if (reader.get<bool>()) {
+    get_pose(motion_.emplace().T_before_now, reader);
+    reader.get(motion_->dt_s);
+  }
+  start_.reset();
+  if (reader.get<bool>()) {
+    reader.get(start_.emplace().t_us);
+    for (auto left = reader.get<int64_t>(); left > 0; --left) {
+      reader.get(start_->seen[reader.get<int64_t>()]);
+    }
+  }
+  pixels_.clear();
+  for (auto left = reader.get<int64_t>(); left > 0; --left) reader.get(pixels_[reader.get<int64_t>()]);
+  reader.get(landmarks_at_keyframe_);
+  reader.get(cov_keyframe_);
+  wheels_.load(reader);
+  ins_.load(reader);
+  for (auto left = reader.get<int64_t>(); left > 0; --left) new_speeds_.push_back(get_speed(reader));
+  reader.get(scale_);
+  reader.get(scale_std_);
+  reader.get(restarted_);
+  reader.get(restart_.t_us);
+  get_pose(restart_.T_local_vehicle, reader);
+  reader.get(restart_.velocity);
+  reader.get(restart_.cov_pose);
+  if (bundling) begin_bundle();
+}
+
+}  // namespace roadfix

@@ -1,0 +1,99 @@
+#include "slam/travel.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "samples/samples.h"
+
+namespace roadfix {
+namespace {
+
+/// What a car's speed does in a time without samples, m/s2: firm braking is 4, ordinary driving below 1.5.
+constexpr double kUnseenAcceleration = 1.5;
+/// Noise of neighbouring samples is alike over this time, s (wheel encoders and filters alike smooth their speeds).
+constexpr double kNoiseCorrelation_s = 0.1;
+
+}  // namespace
+
+void put_speed(const SpeedSample& sample, StateWriter& writer) {
+  writer.put(sample.t_us);
+  writer.put(sample.source);
+  for (const double x : {sample.speed, sample.sigma, sample.scale_std}) writer.put(x);
+}
+
+SpeedSample get_speed(StateReader& reader) {
+  SpeedSample sample;
+  reader.get(sample.t_us);
+  reader.get(sample.source);
+  for (double* x : {&sample.speed, &sample.sigma, &sample.scale_std}) reader.get(*x);
+  return sample;
+}
+
+void TravelHistory::add(const SpeedSample& sample) {
+  if (!marks_.empty() && sample.t_us <= marks_.back().sample.t_us) return;
+  double way = 0.0;
+  if (!marks_.empty()) {
+    const Mark& last = marks_.back();
+    way = last.way + 0.5 * (last.sample.speed + sample.speed) * seconds_between(last.sample.t_us, sample.t_us);
+  }
+  marks_.push_back({sample, way});
+  while (marks_.front().sample.t_us < sample.t_us - kKept_us) marks_.pop_front();
+}
+
+double TravelHistory::way_at(int64_t t_us) const {
+  const auto after = std::lower_bound(marks_.begin(), marks_.end(), t_us,
+                                      [](const Mark& mark, int64_t t) { return mark.sample.t_us < t; });
+  if (after == marks_.begin()) {
+    return after->way - after->sample.speed * seconds_between(t_us, after->sample.t_us);
+  }
+  const Mark& before = *std::prev(after);
+  const double dt_s = seconds_between(before.sample.t_us, t_us);
+  if (after == marks_.end()) return before.way + before.sample.speed * dt_s;
+  const double share = dt_s / seconds_between(before.sample.t_us, after->sample.t_us);
+  const double speed = before.sample.speed + share * (after->sample.speed - before.sample.speed);
+  return before.way + 0.5 * (before.sample.speed + speed) * dt_s;
+}
+
+double TravelHistory::doubt_at(int64_t t_us) const {
+  const auto after = std::lower_bound(marks_.begin(), marks_.end(), t_us,
+                                      [](const Mark& mark, int64_t t) { return mark.sample.t_us < t; });
+  double gap_s = 1e9;
+  if (after != marks_.end()) gap_s = seconds_between(t_us, after->sample.t_us);
+  if (after != marks_.begin()) gap_s = std::min(gap_s, seconds_between(std::prev(after)->sample.t_us, t_us));
+  return 0.5 * kUnseenAcceleration * gap_s * gap_s;
+}
+
+std::optional<Travel> TravelHistory::between(int64_t begin_us, int64_t end_us) const {
+  if (marks_.empty() || begin_us < marks_.front().sample.t_us - kReach_us ||
+      end_us > marks_.back().sample.t_us + kReach_us || begin_us > marks_.back().sample.t_us) {
+    return std::nullopt;
+  }
+  const SpeedSample& last = marks_.back().sample;
+  Travel travel;
+  travel.distance = std::max(0.0, way_at(end_us) - way_at(begin_us));
+  travel.scale_std = last.scale_std;
+  const double noise2 = last.sigma * last.sigma * kNoiseCorrelation_s * seconds_between(begin_us, end_us);
+  const double a = doubt_at(begin_us), b = doubt_at(end_us);
+  travel.sigma = std::sqrt(noise2 + a * a + b * b);
+  return travel;
+}
+
+void TravelHistory::save(StateWriter& writer) const {
+  writer.put(static_cast<int64_t>(marks_.size()));
+  for (const Mark& m : marks_) {
+    put_speed(m.sample, writer);
+    writer.put(m.way);
+  }
+}
+
+void TravelHistory::load(StateReader& reader) {
+  marks_.clear();
+  const auto count = reader.get<int64_t>();
+  for (int64_t i = 0; i < count; ++i) {
+    Mark& m = marks_.emplace_back();
+    m.sample = get_speed(reader);
+    reader.get(m.way);
+  }
+}
+
+}  // namespace roadfix

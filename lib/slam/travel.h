@@ -1,0 +1,58 @@
+/// How far the vehicle has gone between two times, from speeds that arrive with a delay: what gives mono its scale.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "stream/state_bytes.h"
+
+namespace roadfix {
+
+enum class SpeedSource : int8_t { kWheels = 0, kIns = 1 };
+
+struct SpeedSample {
+  int64_t t_us = 0;
+  SpeedSource source = SpeedSource::kWheels;
+  double speed = 0.0;      ///< m/s, magnitude
+  double sigma = 0.0;      ///< m/s, noise of one sample
+  double scale_std = 0.0;  ///< relative, the same for all samples of the source
+};
+
+void put_speed(const SpeedSample& sample, StateWriter& writer);
+SpeedSample get_speed(StateReader& reader);
+
+struct Travel {
+  double distance = 0.0;  ///< m
+  double sigma = 0.0;     ///< m, without the scale error that all distances share
+  double scale_std = 0.0;
+};
+
+/// Speeds of one source. Between samples the speed runs straight; before the first and after the last it stays, and the
+/// doubt grows as a car may brake or pull away.
+class TravelHistory {
+ public:
+  /// Samples come in order of time; an older one is ignored.
+  void add(const SpeedSample& sample);
+
+  /// From `begin_us` to `end_us`; nothing where no sample lies within `kReach_us` of both.
+  [[nodiscard]] std::optional<Travel> between(int64_t begin_us, int64_t end_us) const;
+
+  void save(StateWriter& writer) const;
+  void load(StateReader& reader);
+
+  static constexpr int64_t kReach_us = 1'000'000;
+  static constexpr int64_t kKept_us = 120'000'000;  ///< of the newest samples; older distances are no longer told
+
+ private:
+  struct Mark {
+    SpeedSample sample;
+    double way = 0.0;  ///< m since the first sample ever
+  };
+  [[nodiscard]] double way_at(int64_t t_us) const;
+  [[nodiscard]] double doubt_at(int64_t t_us) const;
+
+  std::deque<Mark> marks_;
+};
+
+}  // namespace roadfix
