@@ -5,6 +5,7 @@
 
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"
+#include "vo_tracker/handler.h"
 #include "wheel_odometry/handler.h"
 
 namespace roadfix {
@@ -20,6 +21,7 @@ struct KnownStage {
 const std::vector<KnownStage>& known_stages() {
   static const std::vector<KnownStage> kStages = {
       {"gnss_ins_ekf", [](const std::filesystem::path& dir) { return make_gnss_ins_ekf(dir); }},
+      {"vo_tracker", [](const std::filesystem::path& dir) { return make_vo_tracker(dir); }},
       {"wheel_odometry", [](const std::filesystem::path& dir) { return make_wheel_odometry(dir); }},
       {"imm_fusion", [](const std::filesystem::path& dir) { return make_imm_fusion(dir); }},
   };

@@ -47,7 +47,13 @@ void print_stage(const StageVerdict& stage) {
 void run_verify(const VerifyArguments& arguments) {
   std::vector<NewStage> stages;
   for (const std::string& name : arguments.stages.empty() ? stage_names() : arguments.stages) {
-    static_cast<void>(make_stages({name}, arguments.config));  // what is wrong with the configuration shows here
+    try {
+      static_cast<void>(make_stages({name}, arguments.config));  // what is wrong with the configuration shows here
+    } catch (const std::runtime_error& e) {
+      if (!arguments.stages.empty()) throw;
+      print_list("not for this vehicle", {name + ": " + e.what()});
+      continue;
+    }
     stages.push_back([name, &arguments] { return std::move(make_stages({name}, arguments.config).front()); });
   }
   const VerifyReport report = verify({arguments.logs.begin(), arguments.logs.end()}, stages);

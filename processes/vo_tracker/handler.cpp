@@ -1,0 +1,23 @@
+#include "vo_tracker/handler.h"
+
+#include "config/config.h"
+#include "vo_tracker/keyframe_stage.h"
+
+namespace roadfix {
+
+std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,
+                                       const std::vector<uint8_t>& superpoint_weights) {
+  return std::make_unique<KeyframeStage>(calibration, config, superpoint_weights);
+}
+
+std::unique_ptr<Stage> make_vo_tracker(const std::filesystem::path& vehicle_dir) {
+  const auto config = load_config_or_defaults<VoTrackerConfig>(vehicle_dir / "vo_tracker.yaml");
+  std::vector<uint8_t> weights;
+  if (!config.superpoint_model.empty()) {
+    const std::string bytes = read_text_file(vehicle_dir / config.superpoint_model, std::size_t{1} << 28U);
+    weights.assign(bytes.begin(), bytes.end());
+  }
+  return make_vo_tracker(load_calibration(vehicle_dir), config, weights);
+}
+
+}  // namespace roadfix

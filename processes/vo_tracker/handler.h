@@ -1,0 +1,39 @@
+/// POSE_VO, VO_STATUS and VO_FEATURES from the cameras and what helps them: translates between messages and an
+/// estimator, lib/slam's in mode `keyframe`.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "bus/stage.h"
+#include "config/calibration.h"
+#include "slam/config.h"
+
+namespace roadfix {
+
+enum class VoMode { kKeyframe };
+
+/// configs/<vehicle>/vo_tracker.yaml.
+struct VoTrackerConfig {
+  VoMode mode = VoMode::kKeyframe;
+  int threads = 2;               ///< 2: bundle adjustment runs beside the tracking; the results are the same
+  double stereo_gap = 0.005;     ///< s, largest difference of the stamps of a stereo pair
+  std::string superpoint_model;  ///< an ONNX file, relative to the configuration's folder; for front end superpoint
+  KeyframeTrackerConfig keyframe;
+};
+
+template <class Visitor>
+void visit(VoTrackerConfig& c, Visitor& v) {
+  v.choice("mode", c.mode, {{"keyframe", VoMode::kKeyframe}});
+  v.integer("threads", c.threads, 1, 2);
+  v.number("stereo_gap_s", c.stereo_gap, 0.0, 0.1);
+  v.text("superpoint_model", c.superpoint_model);
+  v.group("keyframe", c.keyframe);
+}
+
+/// `superpoint_weights`: the bytes of superpoint_model. Throws where the calibration has no camera or not all of one.
+std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,
+                                       const std::vector<uint8_t>& superpoint_weights = {});
+std::unique_ptr<Stage> make_vo_tracker(const std::filesystem::path& vehicle_dir);
+
+}  // namespace roadfix

@@ -1,0 +1,49 @@
+/// The keyframe tracker as a stage.
+///
+/// Clock: CAMERA_RIGHT where there are two cameras, because it is published after CAMERA_LEFT, so that a tick finds the
+/// whole pair; CAMERA_LEFT takes over where the right one falls silent. Nothing but the clock is waited for: a frame is
+/// tracked when it comes, and speeds, which come later, take effect at a fixed delay after their time (as feedback
+/// does), so that the order of their arrival does not matter.
+#pragma once
+
+#include "bus/stage.h"
+#include "vo_tracker/handler.h"
+#include "vo_tracker/thread_executor.h"
+
+namespace roadfix {
+
+class KeyframeTracker;
+struct CameraFrame;
+
+class KeyframeStage final : public Stage {
+ public:
+  KeyframeStage(const Calibration& calibration, const VoTrackerConfig& config,
+                const std::vector<uint8_t>& superpoint_weights);
+  ~KeyframeStage() override;
+
+  [[nodiscard]] const StageSpec& spec() const override { return spec_; }
+  void apply(const Message& message) override;
+  void on_clock(const Message&) override {}
+  void publish(int64_t now_utime, Outputs& outputs) override;
+  void digest(Digest& digest) const override;
+  [[nodiscard]] std::vector<uint8_t> save() const override;
+  void load(std::span<const uint8_t> state) override;
+  [[nodiscard]] std::string effective_config() const override;
+  [[nodiscard]] std::string effective_calibration() const override;
+
+ private:
+  void track(const CameraFrame& frame);
+
+  Calibration calibration_;
+  VoTrackerConfig config_;
+  std::vector<uint8_t> superpoint_weights_;
+  StageSpec spec_;
+  bool stereo_;
+  int wheels_ = 0, ins_ = 0, restart_ = 0;  ///< indices of these inputs
+  std::unique_ptr<Executor> executor_;
+  std::unique_ptr<KeyframeTracker> tracker_;
+  std::unique_ptr<CameraFrame> left_;  ///< waits for its right picture until the tick's end
+  bool tracked_ = false;               ///< a frame since the last publish
+};
+
+}  // namespace roadfix

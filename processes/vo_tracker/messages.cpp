@@ -1,0 +1,137 @@
+#include "vo_tracker/messages.h"
+
+#include <cmath>
+
+#include "bus/sample_codec.h"
+
+namespace roadfix {
+namespace {
+
+// The enums of lib/slam count like the constants of the messages.
+static_assert(static_cast<int>(TrackState::kRelocalised) == vo_status_t::STATE_RELOCALISED);
+static_assert(static_cast<int>(TrackState::kWeak) == vo_status_t::STATE_WEAK);
+static_assert(static_cast<int>(ScaleSource::kStereo) == vo_status_t::SCALE_FROM_STEREO);
+static_assert(static_cast<int>(ScaleSource::kWheels) == vo_status_t::SCALE_FROM_WHEELS);
+static_assert(static_cast<int>(ScaleSource::kIns) == vo_status_t::SCALE_FROM_INS);
+static_assert(static_cast<int>(FeatureUse::kOutlier) == vo_features_t::USE_OUTLIER);
+
+// Of an ordinary car's wheels, where the calibration says nothing: tyres differ by 2 percent, one sample by 0.05 m/s.
+constexpr double kWheelScaleStd = 0.02;
+constexpr double kWheelNoise = 0.05;  // m/s
+
+int8_t pose_state(TrackState state) {
+  switch (state) {
+    case TrackState::kInitialising:
+      return pose_t::STATE_ALIGNING;
+    case TrackState::kGood:
+      return pose_t::STATE_RUNNING;
+    case TrackState::kWeak:
+      return pose_t::STATE_WEAK;
+    case TrackState::kRelocalised:
+      return pose_t::STATE_RELOCALISED;
+    case TrackState::kLost:
+      break;
+  }
+  return pose_t::STATE_LOST;
+}
+
+const char* name_of(FrontEndKind kind) {
+  switch (kind) {
+    case FrontEndKind::kOrb:
+      return "orb";
+    case FrontEndKind::kSift:
+      return "sift";
+    case FrontEndKind::kSuperPoint:
+      return "superpoint";
+    case FrontEndKind::kKlt:
+      break;
+  }
+  return "klt";
+}
+
+}  // namespace
+
+pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin) {
+  pose_t m{};
+  fill_pose(odometry, m);
+  m.frame = pose_t::FRAME_LOCAL;
+  m.origin = origin == BodyOrigin::kRearAxle ? pose_t::ORIGIN_REAR_AXLE : pose_t::ORIGIN_IMU;
+  m.scale = frame.scale == ScaleSource::kNone ? pose_t::SCALE_UNKNOWN : pose_t::SCALE_METRIC;
+  m.state = pose_state(frame.state);
+  m.reason = frame.reason;
+  m.reset_counter = frame.reset_counter;
+  for (int i = 0; i < 3; ++i) m.reset_delta_m[i] = frame.reset_delta.p(i);
+  const Eigen::Quaterniond& q = frame.reset_delta.q;
+  m.reset_delta_q_wxyz[0] = q.w();
+  m.reset_delta_q_wxyz[1] = q.x();
+  m.reset_delta_q_wxyz[2] = q.y();
+  m.reset_delta_q_wxyz[3] = q.z();
+  return m;
+}
+
+vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end) {
+  vo_status_t m{};
+  m.mode = vo_status_t::MODE_KEYFRAME;
+  m.state = static_cast<int8_t>(frame.state);
+  m.reason = frame.reason;
+  m.front_end = name_of(front_end);
+  m.scale_source = static_cast<int8_t>(frame.scale);
+  m.scale_std = frame.scale_std;
+  m.num_features = static_cast<int32_t>(frame.features.size());
+  m.num_matches = frame.num_matches;
+  m.num_inliers = frame.num_inliers;
+  m.inlier_ratio = frame.num_landmarks_seen > 0
+                       ? static_cast<double>(frame.num_inliers) / static_cast<double>(frame.num_landmarks_seen)
+                       : 0.0;
+  m.reprojection_rms_px = frame.rms_px;
+  m.brightness = frame.brightness;
+  m.num_keyframes = static_cast<int32_t>(frame.num_keyframes);
+  m.num_map_points = static_cast<int32_t>(frame.num_landmarks);
+  return m;
+}
+
+vo_features_t vo_features(const TrackedFrame& frame) {
+  vo_features_t m{};
+  for (const UsedFeature& f : frame.features) {
+    m.track_id.push_back(f.feature.track);
+    m.u_px.push_back(f.feature.pixel.x());
+    m.v_px.push_back(f.feature.pixel.y());
+    m.use.push_back(static_cast<int8_t>(f.use));
+  }
+  m.num_features = static_cast<int32_t>(frame.features.size());
+  return m;
+}
+
+Restart restart(const vo_restart_t& m) {
+  Restart r;
+  r.t_us = m.utime;
+  r.T_local_vehicle.p = {m.restart_position_m[0], m.restart_position_m[1], m.restart_position_m[2]};
+  r.T_local_vehicle.q =
+      Eigen::Quaterniond(m.restart_q_wxyz[0], m.restart_q_wxyz[1], m.restart_q_wxyz[2], m.restart_q_wxyz[3]);
+  r.velocity = {m.restart_velocity_mps[0], m.restart_velocity_mps[1], m.restart_velocity_mps[2]};
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) r.cov_pose(i, j) = m.restart_cov_pose_m2_rad2[i][j];
+  return r;
+}
+
+std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels) {
+  const double speed = sample.num_speeds == 4 ? 0.5 * (sample.speeds[2] + sample.speeds[3]) : sample.speeds[0];
+  if (sample.num_speeds < 1 || !std::isfinite(speed)) return std::nullopt;
+  SpeedSample s{sample.t_us, SpeedSource::kWheels, std::abs(speed), kWheelNoise, kWheelScaleStd};
+  if (wheels) {
+    s.sigma = wheels->speed_noise.value_or(kWheelNoise);
+    s.scale_std = wheels->speed_scale_std.value_or(kWheelScaleStd);
+  }
+  return s;
+}
+
+std::optional<SpeedSample> ins_speed(const Odometry& o) {
+  const double speed = o.velocity.norm(), variance = o.cov_velocity(0, 0);
+  if (o.validity == Validity::kInvalid || !std::isfinite(speed) || !(variance >= 0.0)) return std::nullopt;
+  // A filter's velocity error lasts: within a keyframe or ten it is the same, like a scale's.
+  const double sigma = std::sqrt(variance);
+  constexpr double kSlow = 1.0;  // m/s, below which a share of the speed says nothing
+  return SpeedSample{o.t_us, SpeedSource::kIns, speed, sigma, sigma / std::max(kSlow, speed)};
+}
+
+}  // namespace roadfix

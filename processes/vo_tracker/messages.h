@@ -1,0 +1,23 @@
+/// Messages of the camera tracker to and from lib/slam: units and enums, nothing else.
+#pragma once
+
+#include <roadfix/pose_t.hpp>
+#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_restart_t.hpp>
+#include <roadfix/vo_status_t.hpp>
+
+#include "config/calibration.h"
+#include "slam/keyframe_tracker.h"
+
+namespace roadfix {
+
+pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin);
+vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end);
+vo_features_t vo_features(const TrackedFrame& frame);
+
+Restart restart(const vo_restart_t& message);
+/// How fast the vehicle goes; nothing where the sample cannot tell.
+std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels);
+std::optional<SpeedSample> ins_speed(const Odometry& odometry);
+
+}  // namespace roadfix

@@ -1,0 +1,310 @@
+/// The tracker as a stage, on a small made-up street.
+#include "vo_tracker/handler.h"
+
+#include <catch2/catch.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <roadfix/image_t.hpp>
+#include <roadfix/pose_t.hpp>
+#include <roadfix/state_t.hpp>
+#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_restart_t.hpp>
+#include <roadfix/vo_status_t.hpp>
+#include <roadfix/wheels_t.hpp>
+
+#include "bus/message.h"
+#include "bus/stage_runner.h"
+#include "geometry/determinism.h"
+#include "geometry/so3.h"
+#include "support/street.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int kWidth = 480, kHeight = 160, kFrames = 100;
+constexpr double kFocal = 280.0, kBaseline = 0.5, kStep = 0.8;  // m a frame
+constexpr int64_t kFrame_us = 100'000;
+
+const CameraIntrinsics kLens{kWidth, kHeight, kFocal, kFocal, 240.0, 80.0, Distortion::kNone, {}};
+
+/// A camera that looks along the vehicle's x, 1.2 m ahead of its origin.
+CameraMounting mounting(double y) { return {{1.2, y, 1.0}, {0.5, -0.5, 0.5, -0.5}, {}, {}}; }
+
+Calibration calibration(bool stereo) {
+  Calibration c;
+  c.body_origin = BodyOrigin::kRearAxle;
+  CameraCalibration camera;
+  camera.width_px = kWidth;
+  camera.height_px = kHeight;
+  camera.intrinsics_px = Eigen::Vector4d(kFocal, kFocal, kLens.cx, kLens.cy);
+  camera.mounting = mounting(0.0);
+  c.sensors.camera_left = camera;
+  if (stereo) {
+    camera.mounting = mounting(-kBaseline);
+    c.sensors.camera_right = camera;
+  }
+  return c;
+}
+
+/// Straight on for 60 frames, then standing.
+double travelled(int frame) { return kStep * std::min(frame, 60); }
+
+struct Sent {
+  int64_t arrival_us = 0;
+  std::string channel;
+  std::vector<uint8_t> bytes;
+};
+
+template <class T>
+Sent sent(const std::string& channel, int64_t utime, int64_t seq, T message, int64_t delay_us = 0) {
+  message.utime = utime;
+  message.run = 1;
+  message.seq = seq;
+  return {utime + delay_us, channel, encode(message)};
+}
+
+image_t picture_message(const cv::Mat& picture) {
+  image_t m{};
+  m.width_px = picture.cols;
+  m.height_px = picture.rows;
+  m.format = image_t::FORMAT_PNG;
+  cv::imencode(".png", picture, m.data);
+  m.size_bytes = static_cast<int32_t>(m.data.size());
+  return m;
+}
+
+const std::vector<Sent>& pictures() {
+  static const std::vector<Sent> kPictures = [] {
+    fix_eigen_blocking();
+    std::vector<Sent> all;
+    const test::Street street(3);
+    for (int i = 0; i < kFrames; ++i) {
+      const int64_t t = kFrame_us * (i + 1);
+      const auto seed = static_cast<unsigned>(2 * i + 1);
+      const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, travelled(i)}};
+      const SE3 right{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, travelled(i)}};
+      all.push_back(sent("CAMERA_LEFT", t, i, picture_message(street.picture(left, kLens, 2.0, seed))));
+      all.push_back(sent("CAMERA_RIGHT", t, i, picture_message(street.picture(right, kLens, 2.0, seed + 1))));
+    }
+    return all;
+  }();
+  return kPictures;
+}
+
+/// Wheel speeds at 50 Hz, up to `late_us` late.
+std::vector<Sent> with_wheels(std::vector<Sent> all, int64_t late_us) {
+  for (int i = 0; i < 5 * kFrames; ++i) {
+    const int64_t t = 20'000 * (i + 1);
+    wheels_t m{};
+    m.num_speeds = 1;
+    m.direction = wheels_t::DIRECTION_SIGNED;
+    m.speed_mps[0] = t <= kFrame_us * 61 ? 8.0 : 0.0;
+    all.push_back(sent("WHEELS", t, i, m, (i % 3) * late_us / 3));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
+  return all;
+}
+
+class Collector final : public MessageSink {
+ public:
+  void put(const std::string& channel, const Header&, std::span<const uint8_t> bytes) override {
+    messages[channel].emplace_back(bytes.begin(), bytes.end());
+  }
+  template <class T>
+  [[nodiscard]] std::vector<T> all(const std::string& channel) const {
+    std::vector<T> out;
+    if (messages.contains(channel)) {
+      for (const auto& bytes : messages.at(channel)) out.push_back(decode<T>(bytes));
+    }
+    return out;
+  }
+  std::map<std::string, std::vector<std::vector<uint8_t>>> messages;
+};
+
+void feed(StageRunner& runner, const Sent& message) {
+  const auto& inputs = runner.spec().inputs;
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    if (inputs[i].channel == message.channel) runner.offer(static_cast<int>(i), message.bytes);
+  }
+}
+
+VoTrackerConfig threads(int count) {
+  VoTrackerConfig config;
+  config.threads = count;
+  return config;
+}
+
+Collector run(const std::vector<Sent>& messages, bool stereo, int num_threads = 1) {
+  Collector sink;
+  StageRunner runner(make_vo_tracker(calibration(stereo), threads(num_threads)), sink);
+  for (const Sent& m : messages) feed(runner, m);
+  return sink;
+}
+
+bool same_outputs(const Collector& a, const Collector& b) {
+  for (const char* channel : {"POSE_VO", "VO_STATUS", "VO_FEATURES"}) {
+    if (a.messages.at(channel) != b.messages.at(channel)) return false;
+  }
+  return true;
+}
+
+TEST_CASE("a pose, a status and the features come with every frame, for now") {
+  const Collector out = run(pictures(), true);
+  const auto poses = out.all<pose_t>("POSE_VO");
+  const auto statuses = out.all<vo_status_t>("VO_STATUS");
+  const auto features = out.all<vo_features_t>("VO_FEATURES");
+  REQUIRE(poses.size() == kFrames);
+  REQUIRE(statuses.size() == kFrames);
+  REQUIRE(features.size() == kFrames);
+  const pose_t& last = poses.back();
+  CHECK(last.utime == kFrame_us * kFrames);
+  CHECK(last.validity == pose_t::VALIDITY_VALID);
+  CHECK(last.frame == pose_t::FRAME_LOCAL);
+  CHECK(last.origin == pose_t::ORIGIN_REAR_AXLE);
+  CHECK(last.scale == pose_t::SCALE_METRIC);
+  CHECK(last.position_m[0] == Approx(travelled(kFrames)).epsilon(0.03));  // 0.05 deg of the right eye are 3 % here
+  CHECK(std::abs(last.position_m[1]) < 0.5);
+  CHECK(std::abs(last.velocity_mps[0]) < 0.1);
+  CHECK(poses[40].velocity_mps[0] == Approx(8.0).epsilon(0.05));
+  CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
+  CHECK(statuses.back().front_end == "klt");
+  CHECK(statuses.back().scale_source == vo_status_t::SCALE_FROM_STEREO);
+  CHECK(statuses.back().inlier_ratio > 0.8);
+  CHECK(statuses.back().num_inliers <= statuses.back().num_matches);
+  CHECK(statuses.back().num_keyframes > 5);
+  CHECK(statuses.back().brightness > 30.0);
+  CHECK(features.back().num_features == statuses.back().num_features);
+}
+
+TEST_CASE("one thread or two, late wheels or punctual ones: the same bytes") {
+  const Collector one = run(with_wheels(pictures(), 0), false, 1);
+  CHECK(same_outputs(one, run(with_wheels(pictures(), 45'000), false, 2)));
+  CHECK_FALSE(
+      same_outputs(one, run(with_wheels(pictures(), 400'000), false, 1)));  // teeth: too late counts as not there
+  CHECK(same_outputs(run(pictures(), true, 1), run(pictures(), true, 2)));
+}
+
+TEST_CASE("mono takes its scale from the wheels and says so") {
+  for (const bool wheels : {false, true}) {
+    const Collector out = run(wheels ? with_wheels(pictures(), 0) : pictures(), false);
+    const auto poses = out.all<pose_t>("POSE_VO");
+    const auto status = out.all<vo_status_t>("VO_STATUS").back();
+    CHECK(status.scale_source == (wheels ? vo_status_t::SCALE_FROM_WHEELS : vo_status_t::SCALE_FROM_NONE));
+    CHECK(poses.back().scale == (wheels ? pose_t::SCALE_METRIC : pose_t::SCALE_UNKNOWN));
+    const auto way = poses[60].position_m[0] - poses[20].position_m[0];
+    if (wheels) CHECK(way == Approx(40 * kStep).epsilon(0.03));
+    if (wheels) CHECK(status.scale_std == Approx(0.02));
+  }
+}
+
+TEST_CASE("INS speeds that come after the start give a running map its scale") {
+  std::vector<Sent> all = pictures();
+  for (int i = 0; i < kFrames; ++i) {
+    pose_t m{};
+    m.q_wxyz[0] = 1.0;
+    m.validity = pose_t::VALIDITY_VALID;
+    m.velocity_mps[0] = 8.0;
+    m.cov_velocity_m2ps2[0][0] = 0.01;
+    if (i > 15 && i < 60) all.push_back(sent("POSE_INS", kFrame_us * (i + 1), i, m));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
+  const Collector out = run(all, false);
+  const auto statuses = out.all<vo_status_t>("VO_STATUS");
+  const auto poses = out.all<pose_t>("POSE_VO");
+  CHECK(statuses[18].scale_source == vo_status_t::SCALE_FROM_NONE);  // 500 ms of delay are not over
+  CHECK(statuses[59].scale_source == vo_status_t::SCALE_FROM_INS);
+  CHECK(poses[59].reset_counter == 1);
+  CHECK(poses[59].position_m[0] - poses[35].position_m[0] == Approx(24 * kStep).epsilon(0.03));
+}
+
+TEST_CASE("a restart takes effect half a second after its time, on whatever frame comes then") {
+  std::vector<Sent> all = pictures();
+  vo_restart_t m{};
+  m.restart_position_m[0] = 500.0;
+  m.restart_q_wxyz[0] = 1.0;
+  m.restart_velocity_mps[0] = 8.0;
+  const int64_t asked_us = kFrame_us * 20 + 30'000;
+  all.push_back(sent("VO_RESTART", asked_us, 0, m));
+  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
+  const auto poses = run(all, true).all<pose_t>("POSE_VO");
+  for (const pose_t& p : poses) {
+    CHECK(p.reset_counter == (p.utime < asked_us + 500'000 ? 0 : 1));
+  }
+  CHECK(poses[24].position_m[0] < 100.0);
+  const double since_s = static_cast<double>(poses[25].utime - asked_us) * 1e-6;
+  CHECK(poses[25].position_m[0] == Approx(500.0 + 8.0 * since_s).margin(0.3));
+  CHECK(poses[25].reset_delta_m[0] == Approx(poses[25].position_m[0] - poses[24].position_m[0]).margin(2.0));
+
+  all.back().arrival_us = 0;
+  std::vector<Sent> late = pictures();  // asked for too late: in the ledger, and unused
+  late.insert(late.begin() + 2 * 30, sent("VO_RESTART", kFrame_us * 20, 0, m));
+  const Collector out = run(late, true);
+  CHECK(out.all<pose_t>("POSE_VO").back().reset_counter == 0);
+  CHECK(out.messages.contains("LEDGER_VO_TRACKER"));
+}
+
+TEST_CASE("lost, corrupt and blank pictures are survived and named") {
+  std::vector<Sent> all = pictures();
+  image_t broken = decode<image_t>(all[2 * 20].bytes);
+  std::fill(broken.data.begin() + 40, broken.data.end(), uint8_t{0x55});
+  all[2 * 20].bytes = encode(broken);
+  all[2 * 30].bytes =
+      sent("CAMERA_LEFT", kFrame_us * 31, 30, picture_message(cv::Mat::zeros(kHeight, kWidth, CV_8UC1))).bytes;
+  all.erase(all.begin() + 2 * 40);  // a left picture
+  all.erase(all.begin() + 2 * 50);  // a right one, by now at this place
+  const Collector out = run(all, true);
+  const auto poses = out.all<pose_t>("POSE_VO");
+  const auto statuses = out.all<vo_status_t>("VO_STATUS");
+  CHECK(statuses[20].reason == "the picture cannot be read");
+  CHECK(poses[20].validity == pose_t::VALIDITY_COASTING);
+  CHECK(poses[21].validity == pose_t::VALIDITY_VALID);
+  CHECK(statuses[30].reason == "the picture is dark");
+  CHECK(poses.back().validity == pose_t::VALIDITY_VALID);
+  CHECK(poses.back().position_m[0] == Approx(travelled(kFrames)).epsilon(0.03));
+  CHECK(poses[40].utime == kFrame_us * 41);
+  CHECK(poses[40].validity == pose_t::VALIDITY_COASTING);  // carried on over the missing picture
+  CHECK(poses[40].position_m[0] - poses[39].position_m[0] == Approx(kStep).margin(0.2));
+}
+
+TEST_CASE("the left camera goes on alone when the right one falls silent") {
+  std::vector<Sent> all;
+  for (const Sent& m : pictures()) {
+    if (m.channel == "CAMERA_LEFT" || m.arrival_us < kFrame_us * 30) all.push_back(m);
+  }
+  const auto poses = run(all, true).all<pose_t>("POSE_VO");
+  CHECK(poses.back().utime == kFrame_us * kFrames);
+  CHECK(poses.back().validity == pose_t::VALIDITY_VALID);
+  CHECK(poses.back().position_m[0] == Approx(travelled(kFrames)).epsilon(0.05));
+}
+
+TEST_CASE("a snapshot taken on the way goes on with the same bytes") {
+  for (const bool stereo : {true, false}) {
+    const std::vector<Sent> all = stereo ? pictures() : with_wheels(pictures(), 0);
+    Collector whole;
+    StageRunner runner(make_vo_tracker(calibration(stereo), threads(2)), whole);
+    for (const Sent& m : all) feed(runner, m);
+    const auto states = whole.all<state_t>("STATE_VO_TRACKER");
+    REQUIRE(!states.empty());
+    Collector rest;
+    StageRunner resumed(make_vo_tracker(calibration(stereo), threads(1)), rest);
+    resumed.resume(states.front());
+    for (const Sent& m : all) {
+      if (m.arrival_us > states.front().utime - 600'000) feed(resumed, m);
+    }
+    const auto& full = whole.messages.at("POSE_VO");
+    const auto& tail = rest.messages.at("POSE_VO");
+    REQUIRE(tail.size() >= 5);
+    CHECK(std::equal(tail.rbegin(), tail.rend(), full.rbegin()));
+    auto stage = make_vo_tracker(calibration(stereo), threads(1));
+    CHECK_THROWS(stage->load(std::vector<uint8_t>{1, 2, 3}));
+  }
+}
+
+TEST_CASE("what the calibration lacks is named at the start") {
+  Calibration c = calibration(true);
+  c.sensors.camera_right->mounting.reset();
+  CHECK_THROWS_WITH(make_vo_tracker(c, {}), Catch::Contains("sensors.camera_right.T_body_camera"));
+  CHECK_THROWS_WITH(make_vo_tracker(Calibration{}, {}), Catch::Contains("sensors.camera_left"));
+}
+
+}  // namespace
+}  // namespace roadfix
