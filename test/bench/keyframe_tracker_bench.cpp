@@ -1,5 +1,6 @@
 /// Runs the keyframe tracker over a folder in KITTI's odometry layout and prints error and cost.
-///   keyframe_tracker_bench FOLDER [--mono] [--first N] [--count N] [--from N] [--front-end klt|orb|sift|superpoint]
+///   keyframe_tracker_bench FOLDER [--mono] [--first N] [--count N] [--from N] [--set KEY=VALUE] [--weights FILE]
+/// KEY is one of the tracker's configuration, for example kind=orb; FILE the network of kind=superpoint.
 /// CPU is the whole process's, all threads, from before the first frame to after the last; pictures are decoded outside
 /// of it and their cost is printed apart.
 #include <sys/resource.h>
@@ -106,6 +107,7 @@ int run(int argc, char** argv) {
   bool mono = false, verbose = false;
   int first = 0, count = 100000, from = 16;
   KeyframeTrackerConfig config;
+  std::vector<uint8_t> weights;
   for (int i = 1; i < argc; ++i) {
     const std::string a = argv[i];
     const auto value = [&] {
@@ -121,7 +123,10 @@ int run(int argc, char** argv) {
       count = std::stoi(value());
     else if (a == "--from")
       from = std::stoi(value());
-    else if (a == "--set") {
+    else if (a == "--weights") {
+      std::ifstream file(value(), std::ios::binary);
+      weights.assign(std::istreambuf_iterator<char>(file), {});
+    } else if (a == "--set") {
       const std::string kv = value();
       const auto eq = kv.find('=');
       Setter setter{kv.substr(0, eq), kv.substr(eq + 1)};
@@ -134,10 +139,10 @@ int run(int argc, char** argv) {
   fix_opencv_threads();
   const Sequence s = load(folder, mono);
   InlineExecutor executor;
-  KeyframeTracker tracker(config, s.rig, make_front_end(config.front_end), executor);
+  KeyframeTracker tracker(config, s.rig, make_front_end(config.front_end, weights), executor);
   std::vector<Eigen::Vector3d> estimate, reference;
   std::vector<double> cost;
-  double decode = 0.0, inliers = 0.0;
+  double decode = 0.0, inliers = 0.0, matches = 0.0;
   int valid = 0, frames = 0;
   for (int i = first; i < std::min<int>(first + count, static_cast<int>(s.t_us.size())); ++i) {
     char name[32];
@@ -155,6 +160,7 @@ int run(int argc, char** argv) {
     ++frames;
     const bool ok = out.odometry.validity != Validity::kInvalid;
     valid += ok ? 1 : 0;
+    matches += out.num_expected > 0 ? static_cast<double>(out.num_matches) / out.num_expected : 0.0;
     inliers += out.num_landmarks_seen > 0 ? static_cast<double>(out.num_inliers) / out.num_landmarks_seen : 0.0;
     if (verbose)
       std::printf("%d state %d match %d/%d inl %d/%d rms %.3f kf %ld lm %ld cpu %.1f p %.3f %.3f %.3f sigma %.3f %s\n",
@@ -176,10 +182,11 @@ int run(int argc, char** argv) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   std::printf(
-      "valid %d/%d ate_se3 %.3f m ate_sim3 %.3f m cpu %.2f ms p99 %.2f ms (decode %.2f) inliers %.3f keyframes %ld rss "
+      "valid %d/%d ate_se3 %.3f m ate_sim3 %.3f m cpu %.2f ms p99 %.2f ms (decode %.2f) matches %.3f inliers %.3f "
+      "keyframes %ld rss "
       "%.0f MB\n",
       valid, frames, ate(estimate, reference, false), ate(estimate, reference, true), total / frames,
-      cost[cost.size() * 99 / 100], decode / frames, inliers / frames, tracker.last().num_keyframes,
+      cost[cost.size() * 99 / 100], decode / frames, matches / frames, inliers / frames, tracker.last().num_keyframes,
       static_cast<double>(usage.ru_maxrss) / 1024.0);
   return 0;
 }
