@@ -76,44 +76,44 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (!started_ && !good) return done(FuseStatus::kBadQuality);
   if (!started_) start(s);
 
-  const FusionEstimate before = now_;
-  const double dt = seconds_between(t_us_, s.odometry.t_us);
+  const Before before{now_.x, now_.P.block<3, 3>(kPos, kPos), seconds_between(t_us_, s.odometry.t_us)};
   advance(s.odometry.t_us);
   if (!good) {
-    follow_local(before, dt);
+    now_ = combine(imm_);
+    follow_local(before, {now_.x, now_.P.block<3, 3>(kPos, kPos)});
     memory(s.channel).last.reset();
     if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
     return done(FuseStatus::kBadQuality);
   }
   memory(s.channel).alive_us = report.last_us = t_us_;
-  const double known = now_.P.block<2, 2>(kPos, kPos).trace();
-  const FuseStatus status = fuse(s, before, dt, report);
+  const double known = combine_planar(imm_).P.topLeftCorner<2, 2>().trace();
+  const LevelView view = level_view(s.odometry);
+  const FuseStatus status = fuse(s, view, before, report);
   if (s.channel == FusionChannel::kVo) update_tie(s);
-  remember(s);
+  remember(s, view);
   reweigh(imm_);
   now_ = combine(imm_);
   weigh(s.channel, std::max(0.0, known / now_.P.block<2, 2>(kPos, kPos).trace() - 1.0));
   return done(status);
 }
 
-FuseStatus Fusion::fuse(const ChannelSample& s, const FusionEstimate& before, double dt, ChannelReport& report) {
-  if (s.channel == FusionChannel::kIns && !placed_) {
-    follow_local(before, dt);
+FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Before& before, ChannelReport& report) {
+  const bool ins = s.channel == FusionChannel::kIns;
+  const bool placing = ins && !placed_;
+  if (placing || config_.scheme == FusionScheme::kLiteral) {
+    follow_local(before, combine_planar(imm_));
+    if (!placing) return fuse_literal(s, report);
     place(s.odometry);
     return FuseStatus::kAccepted;
   }
-  if (config_.scheme == FusionScheme::kLiteral) {
-    follow_local(before, dt);
-    return fuse_literal(s, report);
-  }
+  if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for its gate
   move_height(s);
-  FuseStatus status = fuse_motion(s, report);
-  now_ = combine(imm_);
-  fuse_rates(s);
-  now_ = combine(imm_);
-  follow_local(before, dt);
-  if (s.channel == FusionChannel::kIns) status = fuse_gain(s, report);
-  return status;
+  const FuseStatus status = fuse_motion(s, view, report);
+  fuse_rates(s, view);
+  const PlanarMixture after = combine_planar(imm_);
+  follow_local(before, after);
+  if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for the tie
+  return ins ? fuse_gain(s, view, {after.x.segment<3>(kPos), after.P}, report) : status;
 }
 
 /// The first sample: position, yaw and speed as it says; a channel without enu gives a local frame only.
@@ -178,7 +178,6 @@ void Fusion::advance(int64_t t_us) {
     predict(imm_, config_.motion, dt);
   }
   let_return(comeback_, config_.comeback, total);
-  now_ = combine(imm_);
   t_us_ = t_us;
 }
 

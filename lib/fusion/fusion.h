@@ -83,7 +83,8 @@ class Fusion {
     double rise = 0.0;            ///< m
     FusionChannel channel = FusionChannel::kIns;
     bool metric = true;
-    const Odometry* felt = nullptr;  ///< the channel's newest velocities and attitude
+    const Odometry* felt = nullptr;  ///< the channel's newest pose, for its velocities and attitude
+    LevelView view;                  ///< of that pose
   };
   struct Poses {
     Odometry fused;  ///< POSE_FUSED, enu
@@ -110,12 +111,20 @@ class Fusion {
   /// What is remembered of a channel.
   struct Memory {
     std::optional<Odometry> last;  ///< at the clone
+    LevelView view;                ///< of last
     int reset_counter = 0;
     bool shares_imu = false;
     Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();  ///< m2/s2, in enu, of the INS at its last sample
     double yaw_rate_variance = 0.0;  ///< rad2/s, of its motion lately: which of two that share a gyro is better
     std::optional<int64_t> alive_us;
     ConsistencyCheck check;
+  };
+
+  /// The combined estimate at the last sample, as far as the local pose needs it.
+  struct Before {
+    fusion::Vector x;
+    Eigen::Matrix3d P;
+    double dt = 0.0;  ///< s since then
   };
 
   /// The estimate after a motion that it has not used.
@@ -142,21 +151,22 @@ class Fusion {
   void start(const ChannelSample& sample);
   void place(const Odometry& o);
   void advance(int64_t t_us);
-  FuseStatus fuse(const ChannelSample& sample, const FusionEstimate& before, double dt, ChannelReport& report);
+  FuseStatus fuse(const ChannelSample& sample, const LevelView& view, const Before& before, ChannelReport& report);
   FuseStatus fuse_literal(const ChannelSample& sample, ChannelReport& report);
-  FuseStatus fuse_motion(const ChannelSample& sample, ChannelReport& report);
-  [[nodiscard]] Planar motion_of(const ChannelSample& sample, const Odometry& last) const;
+  FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, ChannelReport& report);
+  [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
   void follow_velocity_error(const Odometry& ins);
-  void fuse_rates(const ChannelSample& sample);
-  FuseStatus fuse_gain(const ChannelSample& sample, ChannelReport& report);
+  void fuse_rates(const ChannelSample& sample, const LevelView& view);
+  FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
+                       ChannelReport& report);
   void apply_gain(const Measurement<3>& gain);
   void distrust_velocity(const Planar& difference);
   void give_way(const Planar& difference);
-  void remember(const ChannelSample& sample);
+  void remember(const ChannelSample& sample, const LevelView& view);
   void move_height(const ChannelSample& sample);
   void gain_height(const Odometry& o);
-  void follow_local(const FusionEstimate& before, double dt);
+  void follow_local(const Before& before, const PlanarMixture& now);
   void update_tie(const ChannelSample& sample);
   void ask_restart(const char* reason);
   void weigh(FusionChannel c, double information);

@@ -50,7 +50,7 @@ Odometry full_pose(int64_t t_us, const Planar& pose, const Eigen::Matrix3d& P, d
 Fusion::Forward Fusion::forward(const Ahead& a) const {
   const Vector& x = now_.x;
   Forward f;
-  f.planar = {x.segment<3>(kPos), now_.P.block<3, 3>(kPos, kPos)};
+  f.planar = planar_estimate(now_);
   f.speed = x(kSpeed);
   f.speed_variance = now_.P(kSpeed, kSpeed);
   f.turn = x(kTurn);
@@ -81,7 +81,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
       f.speed -= along.dot(x.segment<2>(*s.velocity));
       F.block<1, 2>(3, *s.velocity) = -along;
     }
-    f.turn = level_turn(*a.felt) - (s.drift ? x(*s.drift) : 0.0);
+    f.turn = a.view.turn - (s.drift ? x(*s.drift) : 0.0);
   } else {
     F(3, kSpeed) = 1.0;
   }
@@ -90,7 +90,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   f.planar.pose = after_motion(start, way);
   f.way = way;
   if (s.velocity) f.planar.pose.head<2>() -= heard * x.segment<2>(*s.velocity);
-  const Eigen::Matrix4d P = F * now_.P * F.transpose();
+  const Eigen::Matrix4d P = F.lazyProduct(now_.P).eval().lazyProduct(F.transpose());
   const MotionFloor& least = floor(a.channel);
   const double sigma = least.position * std::sqrt(a.dt) + least.share * way.head<2>().norm();
   f.planar.P = P.topLeftCorner<3, 3>();
@@ -125,8 +125,7 @@ Fusion::Poses Fusion::carried(const Ahead& a) const {
 
   PlanarEstimate l = local_;
   if (a.dt > 0.0) {
-    const PlanarEstimate start{now_.x.segment<3>(kPos), now_.P.block<3, 3>(kPos, kPos)};
-    l = moved_along(local_, start, f.way, f.planar.P);
+    l = moved_along(local_, planar_estimate(now_), f.way, f.planar.P);
   }
   out.local = out.fused;
   const Odometry placed =

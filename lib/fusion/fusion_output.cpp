@@ -19,17 +19,17 @@ constexpr double kLostSigma = 100.0;  ///< m: nobody should drive by this
 /// The local pose goes on by the motion from the last posterior to what is known before any absolute pose is used. What
 /// of it the speed cannot explain is hindsight (a turn shows which way the drift went): the local pose leaves it out,
 /// the published one makes it up at its bounded rate.
-void Fusion::follow_local(const FusionEstimate& before, double dt) {
-  Planar motion = motion_between(before.x.segment<3>(kPos), now_.x.segment<3>(kPos));
-  const Planar driven(0.5 * (before.x(kSpeed) + now_.x(kSpeed)) * dt, 0.0, motion.z());
+void Fusion::follow_local(const Before& before, const PlanarMixture& now) {
+  const Planar start = before.x.segment<3>(kPos);
+  Planar motion = motion_between(start, now.x.segment<3>(kPos));
+  const Planar driven(0.5 * (before.x(kSpeed) + now.x(kSpeed)) * before.dt, 0.0, motion.z());
   const Planar hindsight = motion - driven;
   if (hindsight.norm() > config_.jump_tolerance) {
     const Eigen::Vector2d shift = Eigen::Rotation2Dd(before.x(kYaw)) * hindsight.head<2>();
     take_fix(comeback_, config_.comeback, {shift.x(), shift.y(), 0.0}, false);
     motion = driven;
   }
-  local_ = moved_along(local_, {before.x.segment<3>(kPos), before.P.block<3, 3>(kPos, kPos)}, motion,
-                       now_.P.block<3, 3>(kPos, kPos));
+  local_ = moved_along(local_, {start, before.P}, motion, now.P);
 }
 
 /// Height by the channel that speaks for the motion: its own steps, with what its covariance grows by.
@@ -136,7 +136,9 @@ void Fusion::load(StateReader& reader) {
     bool has = false;
     get(m.reset_counter, m.velocity_covariance, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio, has);
     m.last.reset();
-    if (has) visit_odometry(m.last.emplace(), get);
+    if (!has) continue;
+    visit_odometry(m.last.emplace(), get);
+    m.view = level_view(*m.last);
   }
   restart_.reset();
   if (reader.get<bool>()) {

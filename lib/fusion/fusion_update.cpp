@@ -23,9 +23,8 @@ constexpr double kTieSpacing = 1.0;  ///< s: the tie's comparisons are that far 
 constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 
 /// The INS has used a fix since its last sample: something of its pose became surer.
-bool corrected(const Odometry& last, const Odometry& now) {
-  const Eigen::Vector3d before = planar_covariance(last).diagonal(), after = planar_covariance(now).diagonal();
-  return (after.array() < (1.0 - kCorrected) * before.array()).any();
+bool corrected(const LevelView& last, const LevelView& now) {
+  return (now.P.diagonal().array() < (1.0 - kCorrected) * last.P.diagonal().array()).any();
 }
 
 }  // namespace
@@ -55,10 +54,10 @@ void Fusion::tell(const Innovation<3>& innovation, const Eigen::Vector3d& differ
 
 /// Motion since the last use. Where the INS corrected itself in between, its velocities tell the motion without the
 /// jump.
-Planar Fusion::motion_of(const ChannelSample& s, const Odometry& last) const {
-  const Planar motion = motion_between(planar_pose(last), planar_pose(s.odometry));
-  if (s.channel != FusionChannel::kIns) return motion;
-  const Planar felt = motion_by_velocity(last, s.odometry).way;
+Planar Fusion::motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const {
+  const Planar motion = motion_between(last.pose, now.pose);
+  if (channel != FusionChannel::kIns) return motion;
+  const Planar felt = motion_by_velocity(last, now).way;
   const double tolerance = config_.jump_tolerance;
   const bool jumped = (motion - felt).head<2>().norm() > tolerance || std::abs(motion.z() - felt.z()) > 0.2 * tolerance;
   return ins_corrected_ || jumped ? felt : motion;
@@ -103,7 +102,7 @@ void Fusion::follow_velocity_error(const Odometry& ins) {
   last = P;
 }
 
-FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
+FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, ChannelReport& report) {
   Memory& m = memory(s.channel);
   m.shares_imu = s.shares_imu;
   if (m.last && m.reset_counter != s.reset_counter) {
@@ -121,18 +120,21 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
     m.last.reset();
     return FuseStatus::kNotReady;
   }
-  if (s.channel == FusionChannel::kIns) ins_corrected_ = corrected(*m.last, s.odometry);
-  const Planar motion = motion_of(s, *m.last);
+  const bool ins = s.channel == FusionChannel::kIns;
+  if (ins) ins_corrected_ = corrected(m.view, view);
+  const Planar motion = motion_of(s.channel, m.view, view);
   if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
 
-  if (s.channel == FusionChannel::kIns) follow_velocity_error(s.odometry);
+  if (ins) follow_velocity_error(s.odometry);
   const MotionFloor& f = floor(s.channel);
   const double sigma = f.position * std::sqrt(dt) + f.share * motion.head<2>().norm();
-  Eigen::Matrix3d R = motion_covariance(planar_pose(*m.last), planar_covariance(*m.last), motion,
-                                        planar_covariance(s.odometry), {sigma, sigma, f.yaw * std::sqrt(dt)});
-  if (s.channel == FusionChannel::kIns) {  // its positions' growth is that of the velocity's error, a state here
-    const double yaw = R(2, 2);
-    R = Eigen::Vector3d(sigma * sigma, sigma * sigma, yaw).asDiagonal();
+  const double yaw_sigma = f.yaw * std::sqrt(dt);
+  Eigen::Matrix3d R;
+  if (ins) {  // its positions' growth is that of the velocity's error, a state here
+    const double yaw_growth = std::max(yaw_sigma * yaw_sigma, view.P(2, 2) - m.view.P(2, 2));
+    R = Eigen::Vector3d(sigma * sigma, sigma * sigma, yaw_growth).asDiagonal();
+  } else {
+    R = motion_covariance(m.view.pose, m.view.P, motion, view.P, {sigma, sigma, yaw_sigma});
   }
   m.yaw_rate_variance = R(2, 2) / dt;
   if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
@@ -154,11 +156,10 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, ChannelReport& report) {
 }
 
 /// Speed and yaw rate: of the INS, or while it is silent of who is there.
-void Fusion::fuse_rates(const ChannelSample& s) {
+void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view) {
   if (s.channel != FusionChannel::kIns && alive(FusionChannel::kIns)) return;
   if (s.channel == FusionChannel::kVo && !agreement_.agrees) return;
-  const double turn = level_turn(s.odometry);
-  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, turn, config_.turn_sigma); });
+  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
   if (!s.metric) return;
   const double lasting = s.channel == FusionChannel::kIns ? 0.0 : s.odometry.cov_velocity(0, 0);
   const double variance = lasting + config_.speed_sigma * config_.speed_sigma;
@@ -172,14 +173,14 @@ void Fusion::fuse_rates(const ChannelSample& s) {
   });
 }
 
-FuseStatus Fusion::fuse_gain(const ChannelSample& s, ChannelReport& report) {
-  const Planar pose = planar_pose(s.odometry);
-  const Eigen::Matrix3d P_pose = planar_covariance(s.odometry);
+FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, const PlanarEstimate& known,
+                             ChannelReport& report) {
   gain_height(s.odometry);
-  std::optional<Measurement<3>> gain = gained_pose(now_, pose, P_pose, config_.least_gain);
+  std::optional<Measurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
-  const Measurement<3> plain = absolute_pose(now_.x, pose, P_pose);
+  now_ = combine(imm_);
+  const Measurement<3> plain = absolute_pose(now_.x, view.pose, view.P);
   tell(judge<3>(now_, plain.H, plain.innovation, plain.R), plain.innovation, report);
   FuseStatus status = FuseStatus::kAccepted;
   if (report.nis > config_.gate) {
@@ -189,7 +190,7 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, ChannelReport& report) {
     if (!refused_since_us_) refused_since_us_ = t_us_;
     if (seconds_between(*refused_since_us_, t_us_) < config_.refusal_timeout) return FuseStatus::kGated;
     give_way(plain.innovation);
-    gain = gained_pose(now_, pose, P_pose, config_.least_gain);
+    gain = gained_pose(planar_estimate(now_), view.pose, view.P, config_.least_gain);
     status = FuseStatus::kReset;
     passes_needed_ = 0;
   }
@@ -233,6 +234,7 @@ void Fusion::give_way(const Planar& difference) {
 }
 
 FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
+  now_ = combine(imm_);
   Memory& m = memory(s.channel);
   const AdaptiveConfig& c = config_.adaptive;
   Odometry o = s.odometry;
@@ -248,15 +250,16 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
     report.alpha = alpha_gnss(c, m.check);
     gain_height(o);
   }
-  const Eigen::Matrix3d R = scaled_and_clipped(planar_covariance(o), report.alpha, c);
-  const Planar pose = planar_pose(o);
+  const LevelView view = level_view(o);
+  const Eigen::Matrix3d R = scaled_and_clipped(view.P, report.alpha, c);
+  const Planar pose = view.pose;
   const Measurement<3> at = absolute_pose(now_.x, pose, R);
   tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
   report.gate = c.gate;
   add_nis(m.check, c, report.nis, 3);
   if (report.nis > c.gate) return FuseStatus::kGated;
   update<3>([&](const Vector& x) { return absolute_pose(x, pose, R); });
-  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, level_turn(o), config_.turn_sigma); });
+  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
   if (s.channel == FusionChannel::kIns)
     update<1>([&](const Vector& x) {
       return absolute_component(x, kSpeed, o.velocity.x(), std::sqrt(o.cov_velocity(0, 0)) + 1e-3);
@@ -265,11 +268,12 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
   return FuseStatus::kAccepted;
 }
 
-void Fusion::remember(const ChannelSample& s) {
+void Fusion::remember(const ChannelSample& s, const LevelView& view) {
   Memory& m = memory(s.channel);
   m.reset_counter = s.reset_counter;
   if (s.channel == FusionChannel::kIns || !alive(FusionChannel::kIns)) attitude_ = s.odometry;
   m.last = s.odometry;
+  m.view = view;
   for (Mode& mode : imm_.modes) clone_pose(mode.estimate, slots(s.channel).clone);
 }
 

@@ -42,4 +42,11 @@ void reweigh(Imm& imm);
 /// Moments of the mixture, paper C (7), (8).
 FusionEstimate combine(const Imm& imm);
 
+/// The same where position and yaw are all of the covariance that is asked for.
+struct PlanarMixture {
+  fusion::Vector x = fusion::Vector::Zero();
+  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();  ///< of east, north, yaw
+};
+PlanarMixture combine_planar(const Imm& imm);
+
 }  // namespace roadfix

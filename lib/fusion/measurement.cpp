@@ -30,6 +30,8 @@ Equivalent equivalent(double d, double p, double p_new) { return {d * p / (p - p
 
 }  // namespace
 
+PlanarEstimate planar_estimate(const FusionEstimate& e) { return {e.x.segment<3>(kPos), e.P.block<3, 3>(kPos, kPos)}; }
+
 Measurement<3> absolute_pose(const Vector& x, const Planar& pose, const Eigen::Matrix3d& R) {
   Measurement<3> m;
   m.H.middleCols<3>(kPos).setIdentity();
@@ -71,10 +73,11 @@ Measurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const
   return m;
 }
 
-std::optional<Measurement<3>> gained_pose(const FusionEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
+std::optional<Measurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
                                           double least_gain) {
-  const Eigen::Matrix3d P = e.P.block<3, 3>(kPos, kPos);
-  const Eigen::LLT<Eigen::Matrix3d> llt(P);
+  const Eigen::Matrix3d no_gain = P_pose - (1.0 - least_gain) * e.P;
+  if (Eigen::LLT<Eigen::Matrix3d>(no_gain).info() == Eigen::Success) return std::nullopt;  // in no direction
+  const Eigen::LLT<Eigen::Matrix3d> llt(e.P);
   if (llt.info() != Eigen::Success || !P_pose.allFinite()) return std::nullopt;
   // In the axes that make e's covariance the identity, the pose's is diag(lambda).
   const Eigen::Matrix3d L = llt.matrixL();
@@ -83,7 +86,7 @@ std::optional<Measurement<3>> gained_pose(const FusionEstimate& e, const Planar&
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * (whitened + whitened.transpose()));
   const Eigen::Matrix3d to_axes = solver.eigenvectors().transpose() * L_inverse;
 
-  Planar difference = pose - e.x.segment<3>(kPos);
+  Planar difference = pose - e.pose;
   difference.z() = wrap_angle(difference.z());
   const Eigen::Vector3d d = to_axes * difference;
   Measurement<3> m;
@@ -101,18 +104,6 @@ std::optional<Measurement<3>> gained_pose(const FusionEstimate& e, const Planar&
     }
   }
   if (!gained) return std::nullopt;
-  return m;
-}
-
-std::optional<Measurement<1>> gained_component(const FusionEstimate& e, int index, double value, double variance,
-                                               double least_gain) {
-  const double p = e.P(index, index);
-  if (!(variance > 0.0) || variance >= (1.0 - least_gain) * p) return std::nullopt;
-  const Equivalent q = equivalent(value - e.x(index), p, variance);
-  Measurement<1> m;
-  m.H(0, index) = 1.0;
-  m.innovation(0) = q.innovation;
-  m.R(0, 0) = q.variance;
   return m;
 }
 

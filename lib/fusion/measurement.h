@@ -20,6 +20,9 @@ struct Measurement {
   Eigen::Matrix<double, M, M> R = Eigen::Matrix<double, M, M>::Zero();
 };
 
+/// Position and yaw alone.
+PlanarEstimate planar_estimate(const FusionEstimate& e);
+
 /// Where a relative channel keeps its clone and its parameters.
 struct ChannelSlots {
   int clone = fusion::kInsClone;
@@ -44,11 +47,7 @@ Measurement<3> relative_motion(const fusion::Vector& x, const ChannelSlots& slot
 /// What `pose` with covariance `P_pose` knows beyond `e`, if all that e knows about absolute position were part of it
 /// (F.13): along the directions in which P_pose is smaller by at least `least_gain`, the measurement that takes e to
 /// the pose and its covariance. kUninformative in the others. Nothing where no direction gained.
-std::optional<Measurement<3>> gained_pose(const FusionEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
+std::optional<Measurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
                                           double least_gain);
-
-/// The same for one component.
-std::optional<Measurement<1>> gained_component(const FusionEstimate& e, int index, double value, double variance,
-                                               double least_gain);
 
 }  // namespace roadfix

@@ -20,13 +20,14 @@ void Outlook::see(const ChannelSample& s) {
   step.metric = s.metric;
   step.known = s.odometry.validity != Validity::kInvalid && s.odometry.velocity.allFinite();
   step.felt = s.odometry;
+  step.view = level_view(s.odometry);
   if (before != nullptr) {
     step.way = before->way;
     step.rise = before->rise;
     step.silent = before->silent;
     const double dt = seconds_between(before->t_us, step.t_us);
     if (before->known && step.known && before->channel == step.channel && dt < kLongestGap) {
-      const FeltMotion m = motion_by_velocity(before->felt, step.felt);
+      const FeltMotion m = motion_by_velocity(before->view, step.view);
       step.way = after_motion(step.way, m.way);
       step.rise += m.rise;
     } else {
@@ -55,9 +56,9 @@ Fusion::Poses Outlook::poses(const Fusion& fusion) const {
   const double to_first = std::max(0.0, seconds_between(fusion.t_us(), first.t_us));
   Planar way = Planar::Zero();
   if (first.known && to_first < kLongestGap) {
-    Odometry begin = first.felt;
+    LevelView begin = first.view;
     begin.t_us = fusion.t_us();
-    const FeltMotion m = motion_by_velocity(begin, first.felt);
+    const FeltMotion m = motion_by_velocity(begin, first.view);
     way = m.way;
     a.rise = m.rise;
   } else {
@@ -67,6 +68,7 @@ Fusion::Poses Outlook::poses(const Fusion& fusion) const {
   a.rise += newest.rise - first.rise;
   a.silent += newest.silent - first.silent;
   if (newest.known) a.felt = &newest.felt;
+  a.view = newest.view;
   return fusion.carried(a);
 }
 
@@ -86,7 +88,9 @@ void Outlook::load(StateReader& reader) {
   const auto get = [&](auto&... members) { (fusion::read(reader, members), ...); };
   ahead_.clear();
   last_.reset();
-  if (reader.get<bool>()) visit_step(last_.emplace(), get);
+  if (!reader.get<bool>()) return;
+  visit_step(last_.emplace(), get);
+  last_->view = level_view(last_->felt);
 }
 
 }  // namespace roadfix

@@ -29,7 +29,8 @@ class Outlook {
     FusionChannel channel = FusionChannel::kIns;
     bool metric = true;
     bool known = false;  ///< the sample itself was valid
-    Odometry felt;       ///< velocities and attitude: the last valid ones
+    Odometry felt;
+    LevelView view;  ///< of felt
     Planar way = Planar::Zero();
     double rise = 0.0;    ///< m
     double silent = 0.0;  ///< s in which nobody told the motion

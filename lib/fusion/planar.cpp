@@ -20,13 +20,34 @@ Planar planar_pose(const Odometry& o) {
   return {o.T_frame_vehicle.p.x(), o.T_frame_vehicle.p.y(), yaw_of(o.T_frame_vehicle.q)};
 }
 
-Eigen::Matrix3d planar_covariance(const Odometry& o) {
+namespace {
+
+/// Rows of the rotation's errors about y and z in the yaw's error: (roll, pitch) alone decide.
+Eigen::Matrix3d planar_covariance(const Matrix6d& C, double by_y, double by_z) {
+  Eigen::Matrix3d P;
+  P.topLeftCorner<2, 2>() = C.topLeftCorner<2, 2>();
+  P.block<2, 1>(0, 2) = by_y * C.block<2, 1>(0, 4) + by_z * C.block<2, 1>(0, 5);
+  P.block<1, 2>(2, 0) = P.block<2, 1>(0, 2).transpose();
+  P(2, 2) = by_y * by_y * C(4, 4) + 2.0 * by_y * by_z * C(4, 5) + by_z * by_z * C(5, 5);
+  return P;
+}
+
+}  // namespace
+
+Eigen::Matrix3d planar_covariance(const Odometry& o) { return level_view(o).P; }
+
+LevelView level_view(const Odometry& o) {
   const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
-  Eigen::Matrix<double, 3, 6> J = Eigen::Matrix<double, 3, 6>::Zero();
-  J(0, 0) = J(1, 1) = 1.0;
-  J(2, 4) = std::sin(a.roll) / std::cos(a.pitch);
-  J(2, 5) = std::cos(a.roll) / std::cos(a.pitch);
-  return J * o.cov_pose * J.transpose();
+  const double sr = std::sin(a.roll), cr = std::cos(a.roll), sp = std::sin(a.pitch), cp = std::cos(a.pitch);
+  LevelView view;
+  view.t_us = o.t_us;
+  view.pose << o.T_frame_vehicle.p.x(), o.T_frame_vehicle.p.y(), a.yaw;
+  view.P = planar_covariance(o.cov_pose, sr / cp, cr / cp);
+  view.turn = (o.angular_rate.y() * sr + o.angular_rate.z() * cr) / cp;
+  const double down = o.velocity.y() * sr + o.velocity.z() * cr;  // Ry(pitch) Rx(roll) v
+  view.velocity << cp * o.velocity.x() + sp * down, cr * o.velocity.y() - sr * o.velocity.z(),
+      cp * down - sp * o.velocity.x();
+  return view;
 }
 
 Odometry in_other_frame(const SE3& T_other_frame, const Odometry& o) {
@@ -76,6 +97,8 @@ Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, c
   const Eigen::Matrix3d grown = P_b - carry * P_a * carry.transpose();
   const Eigen::Matrix3d to_start = motion_by_end(a);
   const Eigen::Matrix3d in_start = to_start * grown * to_start.transpose();
+  const Eigen::Matrix3d above = in_start - Eigen::Matrix3d(floor_sigma.cwiseAbs2().asDiagonal());
+  if (Eigen::LLT<Eigen::Matrix3d>(above).info() == Eigen::Success) return 0.5 * (in_start + in_start.transpose());
   // In units of the floor, so that metres and radians may share an eigenvalue problem.
   const Eigen::Matrix3d unit = floor_sigma.asDiagonal(), inverse = floor_sigma.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * inverse * (in_start + in_start.transpose()) *
@@ -99,20 +122,12 @@ double height_growth(double way, double dt) {
   return sigma * sigma;
 }
 
-double level_turn(const Odometry& o) {
-  const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
-  return (o.angular_rate.y() * std::sin(a.roll) + o.angular_rate.z() * std::cos(a.roll)) / std::cos(a.pitch);
-}
-
-FeltMotion motion_by_velocity(const Odometry& a, const Odometry& b) {
+FeltMotion motion_by_velocity(const LevelView& a, const LevelView& b) {
   const double dt = seconds_between(a.t_us, b.t_us);
-  const double turn = 0.5 * (a.angular_rate.z() + b.angular_rate.z()) * dt;
-  // Both velocities in a's level axes; b's axes are turned by what the rates say, not by b's corrected attitude.
-  const YawPitchRoll from = yaw_pitch_roll(a.T_frame_vehicle.q), to = yaw_pitch_roll(b.T_frame_vehicle.q);
-  const Eigen::Vector3d v_a = quaternion({0.0, from.pitch, from.roll}) * a.velocity;
-  const Eigen::Vector3d v_b = quaternion({turn, to.pitch, to.roll}) * b.velocity;
-  const Eigen::Vector3d d = 0.5 * dt * (v_a + v_b);
-  return {{d.x(), d.y(), turn}, d.z()};
+  const double turn = 0.5 * (a.turn + b.turn) * dt;
+  // b's axes are turned by what the rates say, not by b's corrected attitude.
+  const Eigen::Vector2d d = 0.5 * dt * (a.velocity.head<2>() + rotation(turn) * b.velocity.head<2>());
+  return {{d.x(), d.y(), turn}, 0.5 * dt * (a.velocity.z() + b.velocity.z())};
 }
 
 }  // namespace roadfix

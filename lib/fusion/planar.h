@@ -14,6 +14,16 @@ Planar planar_pose(const Odometry& odometry);
 /// Its covariance from the 6x6 pose covariance: yaw's error is that of the rotation about the level frame's z.
 Eigen::Matrix3d planar_covariance(const Odometry& odometry);
 
+/// All of a pose that the plane needs, worked out once.
+struct LevelView {
+  int64_t t_us = 0;
+  Planar pose = Planar::Zero();
+  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, in level axes, x along the yaw
+  double turn = 0.0;                                   ///< rad/s, yaw rate of the level axes
+};
+LevelView level_view(const Odometry& odometry);
+
 /// The same pose in another frame.
 Odometry in_other_frame(const SE3& T_other_frame, const Odometry& odometry);
 
@@ -46,14 +56,11 @@ PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& st
 /// Least variance that a height gains on a way, m2.
 double height_growth(double way, double dt);
 
-/// Yaw rate of the level axes.
-double level_turn(const Odometry& odometry);
-
 /// Motion from a to b by the mean of the velocities, and the rise: for a step in which the estimator corrected itself.
 struct FeltMotion {
   Planar way = Planar::Zero();
   double rise = 0.0;  ///< m
 };
-FeltMotion motion_by_velocity(const Odometry& a, const Odometry& b);
+FeltMotion motion_by_velocity(const LevelView& a, const LevelView& b);
 
 }  // namespace roadfix

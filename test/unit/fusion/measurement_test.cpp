@@ -71,7 +71,7 @@ TEST_CASE("the gained measurement takes the estimate to the pose and its covaria
   const Eigen::Matrix3d P = e.P.block<3, 3>(kPos, kPos);
   const Eigen::Matrix3d better = 0.3 * P;
   const Planar pose = e.x.segment<3>(kPos) + Planar(0.1, -0.2, 0.05);
-  const auto gain = gained_pose(e, pose, better, 0.1);
+  const auto gain = gained_pose(planar_estimate(e), pose, better, 0.1);
   REQUIRE(gain);
   (void)kalman_update<3>(e, gain->H, gain->innovation, gain->R);
   CHECK((e.x.segment<3>(kPos) - pose).norm() < 1e-9);
@@ -81,9 +81,9 @@ TEST_CASE("the gained measurement takes the estimate to the pose and its covaria
 TEST_CASE("what is not better is not used, direction by direction") {
   FusionEstimate e;
   e.P.setIdentity();
-  CHECK(!gained_pose(e, {1.0, 1.0, 0.1}, Eigen::Matrix3d::Identity(), 0.1));
-  CHECK(!gained_pose(e, {1.0, 1.0, 0.1}, 4.0 * Eigen::Matrix3d::Identity(), 0.1));
-  const auto gain = gained_pose(e, {1.0, 1.0, 0.1}, Eigen::Vector3d(0.25, 4.0, 4.0).asDiagonal(), 0.1);
+  CHECK(!gained_pose(planar_estimate(e), {1.0, 1.0, 0.1}, Eigen::Matrix3d::Identity(), 0.1));
+  CHECK(!gained_pose(planar_estimate(e), {1.0, 1.0, 0.1}, 4.0 * Eigen::Matrix3d::Identity(), 0.1));
+  const auto gain = gained_pose(planar_estimate(e), {1.0, 1.0, 0.1}, Eigen::Vector3d(0.25, 4.0, 4.0).asDiagonal(), 0.1);
   REQUIRE(gain);
   (void)kalman_update<3>(e, gain->H, gain->innovation, gain->R);
   CHECK(e.x(kPos) == Approx(1.0));
@@ -96,10 +96,10 @@ TEST_CASE("the same information twice is used once") {
   FusionEstimate e;
   e.P = 4.0 * Matrix::Identity();
   const Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  const auto first = gained_pose(e, {0.5, 0.0, 0.0}, R, 0.1);
+  const auto first = gained_pose(planar_estimate(e), {0.5, 0.0, 0.0}, R, 0.1);
   REQUIRE(first);
   (void)kalman_update<3>(e, first->H, first->innovation, first->R);
-  CHECK(!gained_pose(e, {0.5, 0.0, 0.0}, R, 0.1));
+  CHECK(!gained_pose(planar_estimate(e), {0.5, 0.0, 0.0}, R, 0.1));
 }
 
 TEST_CASE("infinite variance has no effect, to the bit") {
@@ -133,7 +133,7 @@ TEST_CASE("velocities tell the motion without the jump") {
   a.T_frame_vehicle.q = quaternion({0.3, 0.0, 0.0});
   b.T_frame_vehicle.p = Eigen::Vector3d(7.0, 7.0, 0.0);  // wherever a fix took it
   b.T_frame_vehicle.q = quaternion({1.0, 0.0, 0.0});
-  const Planar m = motion_by_velocity(a, b).way;
+  const Planar m = motion_by_velocity(level_view(a), level_view(b)).way;
   CHECK(m.x() == Approx(1.0).epsilon(1e-3));
   CHECK(m.y() == Approx(0.01).epsilon(1e-2));
   CHECK(m.z() == Approx(0.02));
