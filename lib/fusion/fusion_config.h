@@ -40,7 +40,7 @@ struct FusionConfig {
   double vo_scale_std = 0.03;  ///< before GNSS has shown it
   double vo_drift_std = 2e-4;  ///< rad/s
   double wheel_scale_std = 0.01;
-  double least_gain = 0.1;        ///< share of variance that an absolute pose must take away to be used
+  double least_gain = 0.01;       ///< share of variance that an absolute pose must take away to be used
   double gate = 16.3;             ///< squared Mahalanobis distance, 99.9 % of 3 degrees of freedom
   double refusal_timeout = 10.0;  ///< s of refused absolute poses after which they are right
   double ins_timeout = 0.3;       ///< s without a sample: the channel is dead

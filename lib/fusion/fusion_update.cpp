@@ -88,7 +88,7 @@ void Fusion::follow_velocity_error(const Odometry& ins) {
   const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
   const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
   Eigen::Matrix2d& last = memory(FusionChannel::kIns).velocity_covariance;
-  const bool redone = P.trace() < (1.0 - config_.least_gain) * last.trace();
+  const bool redone = ins_corrected_ || P.trace() < (1.0 - kCorrected) * last.trace();
   distrust_ *= std::exp(-seconds_between(memory(FusionChannel::kIns).last->t_us, t_us_) / kDistrustTime);
   for (Mode& mode : imm_.modes) {
     for (int i = 0; i < 2; ++i) {
