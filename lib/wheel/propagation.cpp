@@ -82,6 +82,7 @@ WheelVector propagated_mean(const WheelVector& x, const WheelStep& step) {
   next(kPitch) += step.dt * rates.y();
   if (step.standing) {
     next(kSpeed) = 0.0;
+    if (step.turning) next(kYaw) = wrap_angle(x(kYaw) + step.dt * rates.z());
     return next;
   }
   const double yaw_change = step.dt * rates.z();
@@ -97,6 +98,7 @@ WheelCovariance transition(const WheelVector& x, const WheelStep& step) {
   F.middleRows<2>(kRoll) += angles.topRows<2>();
   if (step.standing) {
     F(kSpeed, kSpeed) = 0.0;
+    if (step.turning) F.row(kYaw) += angles.row(2);
   } else {
     motion_rows(x, step, angles.row(2), F);
   }

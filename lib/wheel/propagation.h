@@ -14,6 +14,7 @@ struct WheelStep {
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< rad/s, raw
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< m/s2, raw specific force
   bool standing = false;                            ///< position and yaw do not move, speed is zero
+  bool turning = false;                             ///< while standing: the yaw moves nevertheless
   std::optional<double> blind_acceleration;         ///< m/s2: no imu; accel is not used
   StepForm form = StepForm::kArc;
 };

@@ -16,7 +16,8 @@ constexpr double kUnknownAcceleration = 1.5;    ///< m/s2 per sqrt(Hz): 1.5 m/s2
 constexpr double kUnknownRate = 0.1;            ///< rad/s per sqrt(Hz): a street corner within a few seconds
 constexpr double kPlainDisturbance = 3.0;       ///< m/s2 per sqrt(Hz): 1.5 m/s2 over 2 s, uncorrected driving
 constexpr double kPlainLevelling = 0.05;        ///< s of force per levelling without wheels
-constexpr double kBiasBlock = 0.2;              ///< s of standing gyro mean per bias update
+constexpr double kBiasBlock = 1.0;              ///< s of standing gyro mean per bias update
+constexpr double kBiasGate = 10.8;              ///< squared sigma, 99.9 %: more than a bias can be is turning
 
 bool usable(const ImuSample& imu) {
   return imu.gyro.cwiseAbs().maxCoeff() < kLargestRate && imu.accel.cwiseAbs().maxCoeff() < kLargestForce &&
@@ -63,6 +64,7 @@ WheelInputStatus WheelOdometry::add(const ImuSample& imu) {
   if (!gyro_yaw_) next.gyro.z() = wheel_yaw_rate_.value_or(0.0);
   next.accel = imu.accel;
   next.standing = standing_.standing;
+  next.turning = turns_standing_;
   next.form = config_.tuning.step_form;
   const double speed = state_.x(kSpeed);
   step(imu.t_us, next, imu_noise());
@@ -198,11 +200,15 @@ void WheelOdometry::learn_bias(const WheelStep& standing_step) {
   block_time_ += standing_step.dt;
   if (block_time_ < kBiasBlock) return;
   const double variance = config_.sensors.gyro_noise * config_.sensors.gyro_noise / block_time_;
-  const Eigen::Vector3d mean = block_gyro_ / block_time_;
+  const Eigen::Vector3d difference = block_gyro_ / block_time_ - state_.x.segment<3>(kGyroBias);
   for (int i = 0; i < 3; ++i) {
+    const double d = difference(i), S = state_.P(kGyroBias + i, kGyroBias + i) + variance;
+    const bool no_bias = d * d > kBiasGate * S;
+    if (i == 2 && no_bias) turns_standing_ = true;
+    if (no_bias || (i == 2 && turns_standing_)) continue;
     WheelVector H = WheelVector::Zero();
     H(kGyroBias + i) = 1.0;
-    schmidt_update(state_, H, mean(i) - state_.x(kGyroBias + i), variance, {kGyroBias + i});
+    schmidt_update(state_, H, d, variance, {kGyroBias + i});
   }
   block_gyro_.setZero();
   block_time_ = 0.0;

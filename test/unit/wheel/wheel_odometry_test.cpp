@@ -100,6 +100,39 @@ TEST_CASE("standing still changes no bit of position and yaw, and learns the gyr
   CHECK(drive.errors.imu_bias.back().gyro.norm() > 5e-3);
 }
 
+/// Wheels at rest under a gyro that says `rate` about z for `duration_s`; gyro_bias_std as the calibration has it.
+WheelState turned_on_the_spot(double rate, double gyro_bias_std, double duration_s) {
+  WheelConfig config;
+  config.sensors.gyro_bias_std = gyro_bias_std;
+  config.sensors.gyro_noise = 3e-5;
+  WheelOdometry odometry(config);
+  for (int64_t i = 0; i <= static_cast<int64_t>(duration_s * 100.0); ++i) {
+    ImuSample imu;
+    imu.t_us = 10'000 * i;
+    imu.gyro.z() = rate;
+    imu.accel.z() = kStandardGravity;
+    (void)odometry.add(imu);
+    WheelSample wheels;
+    wheels.t_us = imu.t_us;
+    if (i % 10 == 0) (void)odometry.add(wheels);
+  }
+  REQUIRE(odometry.report().standing);
+  return odometry.state();
+}
+
+TEST_CASE("a rate that the gyro's bias cannot be is turning, though the wheels stand") {
+  const double rate = 7.6e-4;
+  const WheelState turned = turned_on_the_spot(rate, 1.2e-4, 35.0);
+  CHECK(turned.x(kYaw) == Approx(rate * 33.0).margin(rate * 2.0));
+  CHECK(std::abs(turned.x(kGyroBias + 2)) < 1e-5);
+  CHECK(turned.sigma(kGyroBias + 2) > 1e-4);
+  CHECK(turned.x.segment<3>(kPos).norm() < 1e-9);
+  // One that it can be is its bias, and the car has not turned.
+  const WheelState stood = turned_on_the_spot(rate, 5e-3, 35.0);
+  CHECK(stood.x(kGyroBias + 2) == Approx(rate).epsilon(0.01));
+  CHECK(std::abs(stood.x(kYaw)) < rate * 2.0);
+}
+
 TEST_CASE("reversing: signed, by gear and by magnitude alone all end at one place") {
   for (const WheelSigns signs : {WheelSigns::kSigned, WheelSigns::kGear, WheelSigns::kUnsigned}) {
     ScenarioConfig s = scenario_of("car_park", 120.0);
