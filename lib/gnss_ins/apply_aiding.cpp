@@ -30,7 +30,9 @@ Gates::Gates(double sigma) {
 }
 
 AidingApplier::AidingApplier(const GnssInsConfig& config)
-    : config_(config), lateral_(config.sideslip), vertical_(config.sideslip) {}
+    : config_(config),
+      lateral_(config.sideslip, config.sideslip.prior_count),
+      vertical_(config.sideslip, config.sideslip.heave_prior_count) {}
 
 AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& gates) const {
   const GnssInsVehicle& v = config_.vehicle;
@@ -73,7 +75,7 @@ AidingRecord AidingApplier::apply_height(InsCore& core, const Pending& p, const 
 
 AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates& gates) const {
   const NavState& x = core.state();
-  const double sigma = config_.vehicle.wheel_noise;
+  const double sigma = std::sqrt(p.cov(0, 0));
   double speed = p.value.x();
   Measurement<1> m = wheel_speed(x, core.motion(), speed, sigma, p.ahead(x), config_.vehicle.p_imu_vehicle);
   if (p.direction == WheelDirection::kReverse) speed = -std::abs(speed);
@@ -109,7 +111,8 @@ AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& n
   m.R(0, 0) = sigma * sigma;
   const AidingRecord r = core.fuse(AidingSource::kNoSideslip, x.t_us, m, gate);
   if (learns && x.velocity.norm() > config_.sideslip.min_speed && r.status != AidingStatus::kBadInput)
-    noise.learn(m.residual(0), r.innovation_variance[0] - m.R(0, 0), acceleration);
+    noise.learn({m.residual(0), r.innovation_variance[0] - m.R(0, 0), m.R(0, 0), r.status == AidingStatus::kAccepted},
+                acceleration);
   return r;
 }
 

@@ -21,7 +21,7 @@ struct GnssInsVehicle {
   double position_latency_std = 0.0;                                ///< s
   double velocity_latency_std = 0.0;                                ///< s
   double wheel_scale_std = 0.01;                                    ///< 1
-  double wheel_noise = 0.05;                                        ///< m/s
+  double wheel_noise = 0.05;                                        ///< m/s, each speed
   double track_width = 1.5;                                         ///< m, for four wheel speeds
   double magnetic_declination = 0.0;                                ///< rad, east positive
   Eigen::Vector3d hard_iron = Eigen::Vector3d::Zero();              ///< T, subtracted from the field first
@@ -68,14 +68,15 @@ struct AidingConfig {
 
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
-  double start_std = 0.1;       ///< m/s, before anything is learnt
-  double min_std = 0.003;       ///< m/s
-  double max_std = 0.5;         ///< m/s
-  double doubling_accel = 1.0;  ///< m/s2 of lateral acceleration that doubles it
-  double prior_count = 5.0;     ///< residuals that the start counts for
-  double memory_count = 400.0;  ///< residuals
-  double confidence = 3.0;      ///< sigmas of the learnt variance that are added to it
-  double min_speed = 2.0;       ///< m/s, to learn
+  double start_std = 0.1;           ///< m/s, before anything is learnt
+  double min_std = 0.003;           ///< m/s
+  double max_std = 0.5;             ///< m/s
+  double start_slope = 0.03;        ///< s: m/s per m/s2 of acceleration, likewise (rear slip angle at 10 m/s)
+  double prior_count = 1.0;         ///< residuals that the start counts for
+  double heave_prior_count = 20.0;  ///< likewise, for the vertical axis
+  double memory_count = 400.0;      ///< residuals
+  double confidence = 3.0;          ///< sigmas of the learnt variance that are added to it
+  double min_speed = 2.0;           ///< m/s, to learn
 };
 
 /// How the filter moves between measurements.
@@ -157,8 +158,9 @@ void visit(SideslipConfig& c, Visitor& v) {
   v.number("start_std_mps", c.start_std, 1e-3, 10.0);
   v.number("min_std_mps", c.min_std, 1e-4, 10.0);
   v.number("max_std_mps", c.max_std, 1e-3, 10.0);
-  v.number("doubling_accel_mps2", c.doubling_accel, 0.01, 1e6);
+  v.number("start_slope_s", c.start_slope, 1e-3, 10.0);
   v.number("prior_count", c.prior_count, 1.0, 1e6);
+  v.number("heave_prior_count", c.heave_prior_count, 1.0, 1e6);
   v.number("memory_count", c.memory_count, 1.0, 1e6);
   v.number("confidence", c.confidence, 0.0, 100.0);
   v.number("min_speed_mps", c.min_speed, 0.0, 100.0);

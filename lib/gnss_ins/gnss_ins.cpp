@@ -117,8 +117,10 @@ void GnssIns::add(const WheelSample& wheels, int64_t id) {
   p.t_us = wheels.t_us;
   p.id = id;
   p.direction = wheels.direction;
-  // Four speeds: the rear axle's mean is the speed of its centre.
-  p.value.x() = wheels.num_speeds == 4 ? 0.5 * (wheels.speeds[2] + wheels.speeds[3]) : wheels.speeds[0];
+  // Four speeds: the rear axle's mean is the speed of its centre, with half the variance of one wheel.
+  const bool four = wheels.num_speeds == 4;
+  p.value.x() = four ? 0.5 * (wheels.speeds[2] + wheels.speeds[3]) : wheels.speeds[0];
+  p.cov(0, 0) = config_.vehicle.wheel_noise * config_.vehicle.wheel_noise * (four ? 0.5 : 1.0);
   if (!std::isfinite(p.value.x()) || std::abs(p.value.x()) > 100.0) {
     AidingRecord r;
     r.t_us = wheels.t_us;

@@ -9,39 +9,56 @@ namespace {
 
 constexpr double kMostRatio = 16.0;  // a residual counts at most as four sigma
 constexpr double kMostCorrelation = 0.9;
+constexpr double kLeastSlope = 2.0e-3;  // s, so that a slope can be learnt again
 
 }  // namespace
 
-SideslipNoise::SideslipNoise(const SideslipConfig& config)
-    : config_(config), count_(config.prior_count), variance_(config.start_std * config.start_std) {}
-
-double SideslipNoise::growth(double lateral_acceleration) const {
-  return 1.0 + std::abs(lateral_acceleration) / config_.doubling_accel;
+void LearntVariance::learn(double seen, double noise, double scale, double independent, double memory) {
+  // What one square tells about a variance s in it is 1 / (2 (s + noise)^2): where the rest is large it tells little,
+  // and what was known before stays.
+  const double told = value_ * scale / (value_ * scale + noise);
+  const double counts = told * told * independent;
+  if (counts <= 0.0) return;
+  count_ = std::min(count_ + counts, memory);
+  value_ = std::max(value_ + counts / count_ * ((seen - noise) / scale - value_), least_);
 }
 
-double SideslipNoise::sigma(double lateral_acceleration) const {
-  const double correlation = square_ > 0.0 ? std::clamp(product_ / square_, 0.0, kMostCorrelation) : 0.0;
-  const double inflation = (1.0 + correlation) / (1.0 - correlation);
-  // What is left after the filter's own uncertainty is taken off is a small difference of large numbers: its own
-  // standard deviation, with as many independent residuals as there are, goes on top.
-  const double doubt =
-      config_.confidence * std::sqrt(2.0 * inflation / count_) * (explained_ + std::max(variance_, 0.0));
-  const double variance = std::max(variance_, 0.0) * inflation + doubt;
-  return growth(lateral_acceleration) * std::clamp(std::sqrt(variance), config_.min_std, config_.max_std);
+double LearntVariance::careful(double confidence) const {
+  return value_ * (1.0 + confidence * std::sqrt(2.0 / count_));
 }
 
-void SideslipNoise::learn(double residual, double predicted_variance, double lateral_acceleration) {
-  const double scale = growth(lateral_acceleration);
-  const double expected = std::max(variance_, config_.min_std * config_.min_std) + predicted_variance / (scale * scale);
-  const double bound = std::sqrt(kMostRatio * expected);
-  const double r = std::clamp(residual / scale, -bound, bound);
-  count_ = std::min(count_ + 1.0, config_.memory_count);
-  const double weight = 1.0 / count_;
-  variance_ += weight * (r * r - predicted_variance / (scale * scale) - variance_);
-  explained_ += weight * (predicted_variance / (scale * scale) - explained_);
-  square_ += weight * (r * r - square_);
-  product_ += weight * (r * last_ - product_);
-  last_ = r;
+SideslipNoise::SideslipNoise(const SideslipConfig& config, double prior_count)
+    : config_(config),
+      straight_(config.start_std, config.min_std, prior_count),
+      slope_(config.start_slope, kLeastSlope, prior_count) {}
+
+double SideslipNoise::correlation() const { return std::clamp(product_ - persisting_, 0.0, kMostCorrelation); }
+
+double SideslipNoise::sigma(double acceleration) const {
+  const double inflation = (1.0 + correlation()) / (1.0 - correlation());
+  const double square = acceleration * acceleration;
+  const double variance = straight_.careful(config_.confidence) + square * slope_.careful(config_.confidence);
+  return std::min(std::sqrt(inflation * variance), config_.max_std);
+}
+
+void SideslipNoise::learn(const SideslipResidual& seen, double acceleration) {
+  const double square = acceleration * acceleration;
+  const double straight = straight_.value(), turning = square * slope_.value();
+  const double slip = straight + turning;
+  const double r2 = std::min(seen.value * seen.value, kMostRatio * (slip + seen.explained));
+  const double alike = correlation() * correlation();
+  const double independent = (1.0 - alike) / (1.0 + alike);  // Bartlett 1946
+  straight_.learn(r2, turning + seen.explained, 1.0, independent, config_.memory_count);
+  if (square > 0.0) slope_.learn(r2, straight + seen.explained, square, independent, config_.memory_count);
+
+  const double unit = std::copysign(std::sqrt(r2 / slip), seen.value);
+  seen_ = std::min(seen_ + 1.0, config_.memory_count);
+  product_ += (unit * last_ - product_) / seen_;
+  persisting_ += (last_persisting_ - persisting_) / seen_;
+  last_ = unit;
+  // The update takes the share `gain` of its error out of the filter and puts that share of the slip in.
+  const double gain = seen.used ? seen.explained / (seen.explained + seen.assumed) : 0.0;
+  last_persisting_ = (1.0 - gain) * seen.explained / slip - gain;
 }
 
 }  // namespace roadfix

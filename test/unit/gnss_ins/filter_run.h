@@ -19,7 +19,11 @@ inline GnssInsConfig filter_config(const ScenarioConfig& s) {
   v.gyro_bias_std = s.imu.gyro_bias_std_radps;
   v.accel_bias_std = s.imu.accel_bias_std_mps2;
   v.scale_std = s.imu.gyro_scale_std;
-  v.correlation_s = 1e6;  // the biases of these drives are constant
+  // One process for a constant and a wandering bias: the variance of both, the driving noise of the second.
+  const double ratio = s.imu.gyro_bias_std_radps / s.imu.gyro_bias_drift_std_radps;
+  v.correlation_s = s.imu.bias_correlation_s * (1.0 + ratio * ratio);
+  v.wheel_noise = s.wheels.speed_noise_mps;
+  v.wheel_scale_std = std::hypot(s.wheels.speed_scale_std, s.wheels.wheel_scale_std);
   v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
   v.p_imu_antenna = s.gnss.lever_arm_m;
   return c;
