@@ -9,12 +9,16 @@ namespace roadfix {
 
 namespace {
 
-constexpr double kMaxLag = 1.5;         // s behind the horizon, for receivers that stamp late
-constexpr double kBridgeAccel = 2.0;    // m/s2, what a car may do unseen in a gap of the IMU
-constexpr double kSideslipShown = 3.0;  // s since the last position, to learn the car's sideslip
-constexpr int64_t kDueEarly = 20'000;   // us, so that an interval of whole wheel periods is not missed by jitter
-constexpr double kWheelsSilent = 0.3;   // s without a wheel speed, after which the constraint keeps its own time
-constexpr double kBridgeRate = 0.1;     // rad/s
+constexpr double kMaxLag = 1.5;          // s behind the horizon, for receivers that stamp late
+constexpr double kBridgeAccel = 2.0;     // m/s2, what a car may do unseen in a gap of the IMU
+constexpr double kSideslipShown = 3.0;   // s since the last position, to learn the car's sideslip
+constexpr int64_t kDueEarly = 20'000;    // us, so that an interval of whole wheel periods is not missed by jitter
+constexpr double kWheelsSilent = 0.3;    // s without a wheel speed, after which the constraint keeps its own time
+constexpr double kBridgeRate = 0.2;      // rad/s
+constexpr double kBlindTurn = 0.5;       // s of a gap while moving, after which the heading may be anything
+constexpr double kMoving = 1.0;          // m/s
+constexpr double kFixSpacing = 0.5;      // s, at least, between the two fixes that a start takes a velocity from
+constexpr double kRecoveryHolds = 60.0;  // s; refused again within, the attitude is wrong as well
 
 bool plausible(const ImuSample& s, const PropagationConfig& c) {
   return s.gyro.allFinite() && s.accel.allFinite() && s.gyro.norm() < c.max_gyro && s.accel.norm() < c.max_accel;
@@ -78,8 +82,7 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
     anchor_ = fix.antenna;
     enu_.emplace(fix.antenna);
   }
-  fix_before_ = fix_;
-  fix_ = fix;
+  remember(fix);
   const Eigen::Matrix3d to_enu = enu_->R_anchor_enu_at(fix.antenna);
   const AidingConfig& a = config_.aiding;
   const auto floored = [&](Eigen::Matrix3d cov, double floor) {
@@ -108,6 +111,13 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
     p.cov = sigma * sigma * Eigen::Matrix3d::Identity();
     pending_.push(p);
   }
+}
+
+void GnssIns::remember(const GnssFix& fix) {
+  // A fast receiver's neighbouring fixes are too close for a velocity: the older one stays for twice the least spacing.
+  if (fix_ && (!fix_before_ || seconds_between(fix_before_->t_us, fix.t_us) >= 2.0 * kFixSpacing))
+    fix_before_ = seconds_between(fix_->t_us, fix.t_us) >= kFixSpacing ? fix_ : fix;
+  fix_ = fix;
 }
 
 void GnssIns::add(const WheelSample& wheels, int64_t id) {
@@ -155,6 +165,12 @@ void GnssIns::note(AidingRecord record, int64_t id) {
   if (records_.size() < records_.capacity()) records_.push_back(record);
 }
 
+ImuNoise GnssIns::noise_over(double dt) const {
+  if (dt <= config_.propagation.max_gap && !monitor_.frozen()) return monitor_.noise();
+  // White noise that over this time does what an unseen manoeuvre may do, (M.18).
+  return {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt)};
+}
+
 void GnssIns::step(const ImuSample& imu) {
   const double dt = last_step_us_ == 0 ? 0.0 : seconds_between(last_step_us_, imu.t_us);
   last_step_us_ = imu.t_us;
@@ -162,24 +178,13 @@ void GnssIns::step(const ImuSample& imu) {
   const PropagationConfig& c = config_.propagation;
   const bool gap = dt > c.max_gap;
   const bool block_done = !gap && monitor_.add(imu, dt);
-  ImuNoise noise = monitor_.noise();
+  const ImuNoise noise = noise_over(dt);
   if (gap) {
     ++gaps_;
     // What was measured inside the gap is of a time that the state skips.
     pending_.drop_before(imu.t_us - static_cast<int64_t>(1e6 * c.max_gap));
   }
-  if (gap || monitor_.frozen()) {
-    // White noise that over this time does what an unseen manoeuvre may do, (M.18).
-    noise.accel = kBridgeAccel * std::sqrt(dt);
-    noise.gyro = kBridgeRate * std::sqrt(dt);
-  }
-  if (dt > c.realign_gap) {
-    phase_ = AlignmentPhase::kWaiting;
-    core_.reset();
-    bank_.stop();
-    pending_.clear();
-    lag_us_ = lag_of(prior_age(config_.vehicle));
-  }
+  if (dt > c.realign_gap || (dt > kBlindTurn && moved_meanwhile(dt))) align_again();
   if (phase_ == AlignmentPhase::kDone) {
     core_->predict(imu, dt, noise);
     step_aligned(imu, block_done);
@@ -192,6 +197,26 @@ void GnssIns::step(const ImuSample& imu) {
   }
 }
 
+bool GnssIns::moved_meanwhile(double dt) const {
+  if (core() == nullptr) return false;
+  const NavState& before = core()->state();
+  if (before.velocity.norm() > kMoving) return true;
+  if (!fix_ || fix_->t_us <= before.t_us) return false;
+  const Eigen::Vector3d way =
+      enu_->enu(fix_->antenna) - before.position - before.q_enu_imu * config_.vehicle.p_imu_antenna;
+  return way.head<2>().norm() > kMoving * dt + 3.0 * std::sqrt(fix_->cov_enu(0, 0) + fix_->cov_enu(1, 1));
+}
+
+void GnssIns::align_again() {
+  phase_ = AlignmentPhase::kWaiting;
+  core_.reset();
+  bank_.stop();
+  pending_.clear();
+  refused_ = 0;
+  forward_stale_ = true;
+  lag_us_ = lag_of(prior_age(config_.vehicle));
+}
+
 void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
   InsCore& core = *core_;
   bool wheels = false;
@@ -200,6 +225,10 @@ void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
                       wheels = wheels || p.kind == PendingKind::kWheels;
                       use(p);
                     });
+  if (lost_) {
+    lost_ = false;
+    return align_again();
+  }
   if (wheels) wheels_at_us_ = imu.t_us;
   // Where wheel speeds come, the constraint joins them: one epoch of updates instead of two.
   if (wheels || seconds_between(wheels_at_us_, imu.t_us) > kWheelsSilent) {
@@ -255,6 +284,9 @@ void GnssIns::use_position(const Pending& p) {
     if (refused_++ == 0) refused_since_us_ = p.t_us;
     const AlignmentConfig& a = config_.alignment;
     if (refused_ >= a.recovery_fixes && seconds_between(refused_since_us_, p.t_us) >= a.recovery_s) {
+      // Position and velocity were taken from the fixes and do not hold: the heading must be wrong.
+      lost_ = recovered_at_us_ != 0 && seconds_between(recovered_at_us_, p.t_us) < kRecoveryHolds;
+      recovered_at_us_ = p.t_us;
       recover(p);
       r.status = AidingStatus::kReset;
     }

@@ -77,6 +77,10 @@ class GnssIns {
   void use(const Pending& p);
   void use_position(const Pending& p);
   void recover(const Pending& p);
+  void align_again();
+  [[nodiscard]] bool moved_meanwhile(double dt) const;
+  [[nodiscard]] ImuNoise noise_over(double dt) const;
+  void remember(const GnssFix& fix);
   void note(AidingRecord record, int64_t id);
   void rebase_forward();
   template <class Archive>
@@ -105,12 +109,14 @@ class GnssIns {
   Eigen::Matrix3d cov_velocity_ = Eigen::Matrix3d::Zero();
   int64_t next_sideslip_us_ = 0, next_heave_us_ = 0;
   int64_t last_mag_us_ = 0, last_wheel_us_ = 0, wheels_at_us_ = 0;
-  std::optional<GnssFix> fix_, fix_before_;  // newest good ones, for the start
+  std::optional<GnssFix> fix_, fix_before_;  // good ones, for the start
   std::optional<double> wheel_speed_;
   std::array<int64_t, kAidingSources> used_at_us_{};
   int64_t coasting_since_us_ = 0;
   int64_t refused_since_us_ = 0;
   int refused_ = 0;
+  int64_t recovered_at_us_ = 0;
+  bool lost_ = false;  // to be aligned again
   int reset_counter_ = 0;
   SE3 reset_delta_;
   int64_t bad_imu_ = 0, gaps_ = 0;

@@ -71,11 +71,10 @@ void GnssIns::rebase_forward() {
     forward_stale_ = false;
     cov_at_us_ = 0;
   }
-  const ImuNoise noise = monitor_.noise();
   for (; forward_to_ < ring_.end(); ++forward_to_) {
     const ImuSample& s = ring_[forward_to_];
     const double dt = seconds_between(forward_->state().t_us, s.t_us);
-    if (dt > 0.0) forward_->predict(s, dt, noise);
+    if (dt > 0.0) forward_->predict(s, dt, noise_over(dt));
   }
 }
 

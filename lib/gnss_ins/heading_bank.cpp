@@ -14,6 +14,10 @@ namespace {
 constexpr double kNoGate = 1e12;
 // A record counts at most this much against a hypothesis: one wild measurement must not decide.
 constexpr double kMostNis = 50.0;
+// Above this speed hardly a car is in reverse. With the no-sideslip constraint a heading and its opposite look alike
+// until the car turns or brakes hard.
+constexpr double kReverseSpeed = 4.0;     // m/s
+constexpr double kReverseBelief = -12.0;  // log of 6e-6
 constexpr double kSameHeading = 10.0 * kDegree;
 
 // Roll and pitch that turn the mean specific force upright, with the yaw asked for.
@@ -98,10 +102,19 @@ void HeadingBank::weigh(size_t i, const AidingRecord& r) {
   log_weights_[i] += std::max(r.log_likelihood, r.log_likelihood + 0.5 * (r.nis - kMostNis));
 }
 
+double HeadingBank::belief(size_t i) const {
+  const NavState& x = cores_[i].state();
+  const double forward = (x.q_enu_imu * (x.R_imu_vehicle() * Eigen::Vector3d::UnitX())).dot(x.velocity);
+  return log_weights_[i] + (forward < -kReverseSpeed ? kReverseBelief : 0.0);
+}
+
 void HeadingBank::normalise() {
-  leader_ = static_cast<size_t>(std::max_element(log_weights_.begin(), log_weights_.end()) - log_weights_.begin());
-  const double most = log_weights_[leader_];
+  double most = log_weights_.front();
+  for (const double w : log_weights_) most = std::max(most, w);
   for (double& w : log_weights_) w -= most;
+  leader_ = 0;
+  for (size_t i = 1; i < cores_.size(); ++i)
+    if (belief(i) > belief(leader_)) leader_ = i;
 }
 
 bool HeadingBank::confirmed() const {
@@ -112,7 +125,7 @@ bool HeadingBank::confirmed() const {
   double others = 0.0, same = 0.0;
   for (size_t i = 0; i < cores_.size(); ++i) {
     const bool agrees = std::abs(wrap_angle(yaw_of(cores_[i].state().q_enu_imu) - yaw)) < kSameHeading;
-    (agrees ? same : others) += std::exp(log_weights_[i]);
+    (agrees ? same : others) += std::exp(belief(i) - belief(leader_));
   }
   return same / (same + others) > config_.alignment.confirm_probability;
 }

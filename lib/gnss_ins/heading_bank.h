@@ -72,6 +72,8 @@ class HeadingBank {
  private:
   void add_hypothesis(const Geodetic& anchor, const StartState& start, double yaw, double yaw_std);
   void weigh(size_t i, const AidingRecord& r);
+  /// Log weight of hypothesis i, with how likely a car drives as it says: forwards, unless it is slow.
+  [[nodiscard]] double belief(size_t i) const;
   void normalise();
 
   GnssInsConfig config_;
