@@ -10,18 +10,104 @@ constexpr int64_t kHeartbeat_us = 1'000'000;
 constexpr int64_t kConfig_us = 10'000'000;
 /// Without a tick for this long a stage says so; shorter gaps are ordinary.
 constexpr int64_t kNoClock_us = 1'000'000;
+/// So many clock samples in a row, all that much older than the clock: the stamps have gone back (a log played again, a
+/// corrected clock), and no newer one will come for a long time.
+constexpr int64_t kBehind = 20;
+constexpr int64_t kBehind_us = 10'000'000;
 }  // namespace
 
-LiveStage::LiveStage(std::unique_ptr<Stage> stage, Bus& bus)
-    : bus_(bus), runner_(std::make_unique<StageRunner>(std::move(stage), *this)) {
+LiveStage::LiveStage(std::function<std::unique_ptr<Stage>()> make, Bus& bus)
+    : bus_(bus),
+      make_(std::move(make)),
+      runner_(std::make_unique<StageRunner>(make_(), *this)),
+      overload_(runner_->spec().overload) {
   runner_->measure_time();
   started_us_ = clock_.now_utime();
   const std::vector<InputSpec>& inputs = runner_->spec().inputs;
   for (int i = 0; i < static_cast<int>(inputs.size()); ++i) {
-    bus_.subscribe(inputs[static_cast<std::size_t>(i)].channel, [this, i](const BusMessage& message) {
-      if (runner_->offer(i, message.bytes) == Offer::kTick) last_tick_us_ = clock_.now_utime();
-    });
+    bus_.subscribe(inputs[static_cast<std::size_t>(i)].channel,
+                   [this, i](const BusMessage& message) { take(i, message.bytes); });
   }
+}
+
+void LiveStage::take(int input, std::span<const uint8_t> bytes) {
+  const std::optional<Header> header = read_header(bytes);
+  if (header && overload_.concerns(input)) {
+    const std::vector<QueueStatus> queues = bus_.queues();
+    const auto i = static_cast<std::size_t>(input);
+    if (overload_.skips(input, header->utime, i < queues.size() ? queues[i].depth : 0)) {
+      runner_->skip(input, bytes);
+      return;
+    }
+  }
+  if (memory_ && header && is_plausible(*header) && is_clock(input)) recall(header->utime);
+  const Offer offer = runner_->offer(input, bytes);
+  if (offer == Offer::kTick) {
+    last_tick_us_ = clock_.now_utime();
+    behind_ = 0;
+    return;
+  }
+  const std::optional<int64_t> now = runner_->stream().clock_utime();
+  if (offer == Offer::kWaits || !header || !now || !is_clock(input) || header->utime > *now - kBehind_us) return;
+  if (++behind_ < kBehind) return;
+  begin_again(header->utime);
+  runner_->offer(input, bytes);
+}
+
+void LiveStage::remember_in(const std::filesystem::path& file) {
+  if (memory_input(runner_->spec()) < 0) return;
+  memory_file_ = file;
+  memory_ = read_memory(file, runner_->spec());
+}
+
+/// As old as the horizon will be after the first clock sample: the first input to be applied.
+void LiveStage::recall(int64_t first_utime) {
+  int64_t lateness_us = 0;
+  for (const InputSpec& input : runner_->spec().inputs) lateness_us = std::max(lateness_us, input.lateness_us);
+  memory_->utime = first_utime - lateness_us;
+  memory_->run = clock_.run();
+  memory_->seq = 0;
+  const std::vector<uint8_t> bytes = encode(*memory_);
+  memory_.reset();
+  bus_.publish(stage_channel("START_", runner_->spec().name), bytes);
+  runner_->offer(memory_input(runner_->spec()), bytes);
+}
+
+void LiveStage::remember() {
+  if (memory_file_.empty() || !runner_->stream().clock_utime()) return;
+  state_t memory{};
+  memory.state = runner_->stage().memory();
+  if (memory.state.empty()) return;
+  memory.size_bytes = static_cast<int32_t>(memory.state.size());
+  memory.horizon_utime = *runner_->stream().horizon_utime();
+  memory.process = runner_->spec().name;
+  memory.layout = runner_->spec().state_layout;
+  try {
+    write_memory(memory_file_, memory);
+    memory_trouble_.clear();
+  } catch (const std::runtime_error& e) {
+    memory_trouble_ = e.what();  // the drive goes on without
+  }
+}
+
+bool LiveStage::is_clock(int input) const {
+  const std::vector<ClockSpec>& clocks = runner_->spec().clocks;
+  return std::any_of(clocks.begin(), clocks.end(), [&](const ClockSpec& clock) { return clock.input == input; });
+}
+
+/// A new run, as if the process had been started anew. A log may be played for the third time: no two runs have one
+/// name.
+void LiveStage::begin_again(int64_t utime) {
+  const int64_t back_us = *runner_->stream().clock_utime() - utime;
+  runs_.insert(*runner_->stream().run());
+  runner_ = std::make_unique<StageRunner>(make_(), *this);
+  runner_->measure_time();
+  int64_t name = utime;
+  while (runs_.contains(name)) ++name;
+  runner_->name_run(name);
+  overload_ = OverloadChoice(runner_->spec().overload);
+  behind_ = 0;
+  began_because_ = "the stamps went back by " + std::to_string(back_us / 1'000'000) + " s: a new run";
 }
 
 bool LiveStage::step(std::chrono::milliseconds patience) {
@@ -35,6 +121,7 @@ void LiveStage::publish_due() {
   const int64_t now = clock_.now_utime();
   if (now >= next_config_us_) {
     publish_config(now);
+    remember();
     next_config_us_ = now + kConfig_us;
   }
   if (now >= next_heartbeat_us_) {
@@ -43,7 +130,10 @@ void LiveStage::publish_due() {
   }
 }
 
-void LiveStage::stop() { publish_heartbeat(clock_.now_utime(), true); }
+void LiveStage::stop() {
+  remember();
+  publish_heartbeat(clock_.now_utime(), true);
+}
 
 void LiveStage::put(const std::string& channel, const Header&, std::span<const uint8_t> bytes) {
   bus_.publish(channel, bytes);
@@ -65,7 +155,14 @@ std::pair<int8_t, std::string> LiveStage::state(int64_t now_utime) const {
               runner_->spec().inputs[i].channel + ": two publishers, or a log played again with old names"};
     }
   }
-  return {heartbeat_t::STATE_RUNNING, ""};
+  for (std::size_t i = 0; i < runner_->spec().inputs.size(); ++i) {
+    if (const int64_t skipped = stream.track(static_cast<int>(i)).counters.skipped; skipped > 0) {
+      return {heartbeat_t::STATE_DEGRADED,
+              runner_->spec().inputs[i].channel + ": too fast for this stage, " + std::to_string(skipped) + " skipped"};
+    }
+  }
+  if (!memory_trouble_.empty()) return {heartbeat_t::STATE_DEGRADED, memory_trouble_};
+  return {heartbeat_t::STATE_RUNNING, began_because_};
 }
 
 void LiveStage::publish_heartbeat(int64_t now_utime, bool stopping) {
@@ -102,6 +199,7 @@ void LiveStage::fill_inputs(heartbeat_t& heartbeat) {
     heartbeat.input_duplicate.push_back(counters.duplicate);
     heartbeat.input_undecodable.push_back(counters.undecodable);
     heartbeat.input_refused.push_back(counters.refused);
+    heartbeat.input_skipped.push_back(counters.skipped);
     heartbeat.input_queue_depth.push_back(queue.depth);
     const int64_t waits_us = queue.oldest_us > 0 ? heartbeat.utime - queue.oldest_us : 0;
     heartbeat.input_queue_age_s.push_back(static_cast<double>(waits_us) * 1e-6);

@@ -1,36 +1,50 @@
 /// A stage on a bus: subscribes to its inputs, publishes its outputs, and once a second says how it is.
 ///
 /// The wall clock is read for heartbeats and configuration messages only; what the stage computes is the runner's, and
-/// so the same as in replay.
+/// so the same as in replay. What it decides by arrival (which frames to skip under overload, when to begin again) the
+/// ledger tells.
 #pragma once
 
-#include <map>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <roadfix/heartbeat_t.hpp>
+#include <set>
 #include <string>
 
 #include "bus/bus.h"
 #include "bus/process_facts.h"
 #include "bus/run_clock.h"
+#include "bus/stage_memory.h"
 #include "bus/stage_runner.h"
+#include "stream/overload_choice.h"
 
 namespace roadfix {
 
 class LiveStage : public MessageSink {
  public:
   /// `bus` must outlive it. Subscribes at once.
-  LiveStage(std::unique_ptr<Stage> stage, Bus& bus);
+  LiveStage(std::function<std::unique_ptr<Stage>()> make, Bus& bus);
+
+  /// Keeps what the stage wants to remember in this file, and begins with what is there (bus/stage_memory.h). Before
+  /// the first step(). Throws std::runtime_error where the file cannot be used; the stage then begins without.
+  void remember_in(const std::filesystem::path& file);
 
   /// Handles what comes within `patience`, and publishes what is due. False when the bus has ended.
   bool step(std::chrono::milliseconds patience);
 
-  /// The last heartbeat: stopping.
+  /// Keeps what is to be remembered, and says so with the last heartbeat: stopping.
   void stop();
 
   [[nodiscard]] const StageRunner& runner() const { return *runner_; }
 
  private:
   void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) override;
+  void take(int input, std::span<const uint8_t> bytes);
+  [[nodiscard]] bool is_clock(int input) const;
+  void begin_again(int64_t utime);
+  void recall(int64_t first_utime);
+  void remember();
   void publish_due();
   void publish_heartbeat(int64_t now_utime, bool stopping);
   void fill_inputs(heartbeat_t& heartbeat);
@@ -40,7 +54,15 @@ class LiveStage : public MessageSink {
   Bus& bus_;
   RunClock clock_;
   ProcessLoad load_;
+  std::function<std::unique_ptr<Stage>()> make_;
   std::unique_ptr<StageRunner> runner_;
+  OverloadChoice overload_;
+  int64_t behind_ = 0;         ///< clock samples in a row that are far behind the clock
+  std::string began_because_;  ///< of the run, where it is not the first
+  std::set<int64_t> runs_;     ///< names given before
+  std::filesystem::path memory_file_;
+  std::optional<state_t> memory_;  ///< until the first clock sample
+  std::string memory_trouble_;
   int64_t started_us_ = 0;
   int64_t last_tick_us_ = 0;  ///< of the run clock, when the newest tick came
   int64_t next_heartbeat_us_ = 0;

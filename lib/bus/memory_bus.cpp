@@ -24,4 +24,14 @@ bool MemoryBus::handle(std::chrono::milliseconds) {
   return true;
 }
 
+std::vector<QueueStatus> MemoryBus::queues() const {
+  std::vector<QueueStatus> all(subscriptions_.size());
+  for (const Sent& message : sent_) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i].depth += std::regex_match(message.channel, subscriptions_[i].channels) ? 1 : 0;
+    }
+  }
+  return all;
+}
+
 }  // namespace roadfix

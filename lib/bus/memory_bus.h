@@ -14,6 +14,7 @@ class MemoryBus : public Bus {
   void publish(const std::string& channel, std::span<const uint8_t> bytes) override;
   /// Never waits; false where nothing was there.
   bool handle(std::chrono::milliseconds patience) override;
+  [[nodiscard]] std::vector<QueueStatus> queues() const override;
 
  private:
   struct Subscription {

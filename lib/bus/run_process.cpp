@@ -23,15 +23,23 @@ void note_stop(int signal) {
 struct Arguments {
   std::string config;
   std::string bus = kDefaultBusUrl;
+  std::string memory;
   std::string log_in;
   std::string log_out;
   bool print_config = false;
 };
 
-void run_live(const Arguments& arguments, std::unique_ptr<Stage> stage) {
-  const std::string name = stage->spec().name;
+void run_live(const Arguments& arguments, const MakeStage& make, const std::string& name) {
   NetworkBus bus(arguments.bus);
-  LiveStage live(std::move(stage), bus);
+  LiveStage live([&] { return make(arguments.config); }, bus);
+  if (!arguments.memory.empty()) {
+    try {
+      std::filesystem::create_directories(arguments.memory);
+      live.remember_in(std::filesystem::path(arguments.memory) / (name + ".state"));
+    } catch (const std::runtime_error& e) {
+      std::cerr << name << ": begins without what it knew: " << e.what() << "\n";
+    }
+  }
   if (const int bytes = bus.receive_buffer_bytes(); bytes > 0 && bytes < kReceiveBufferBytes) {
     std::cerr << name << ": the kernel gives the socket only " << bytes
               << " bytes; large messages may be lost: sysctl -w "
@@ -47,7 +55,7 @@ void run(const Arguments& arguments, const MakeStage& make) {
   if (arguments.print_config) {
     std::cout << stage->effective_config();
   } else if (arguments.log_in.empty()) {
-    run_live(arguments, std::move(stage));
+    run_live(arguments, make, stage->spec().name);
   } else {
     std::vector<std::unique_ptr<Stage>> stages;
     stages.push_back(std::move(stage));
@@ -70,6 +78,7 @@ int run_process(int argc, char** argv, const MakeStage& make) {
   CLI::App app{"A stage of Roadfix: live on the bus, or over a log"};
   app.add_option("--config", arguments.config, "The vehicle's configuration folder")->required();
   app.add_option("--bus", arguments.bus, "LCM URL")->capture_default_str();
+  app.add_option("--memory", arguments.memory, "Folder for what is kept from one start to the next");
   CLI::Option* log_in = app.add_option("--log-in", arguments.log_in, "Read the inputs from this log, not from the bus");
   CLI::Option* log_out = app.add_option("--log-out", arguments.log_out, "Write the outputs to this log");
   log_in->needs(log_out);

@@ -26,12 +26,19 @@ struct OutputSpec {
   std::string type;
 };
 
+enum class Snapshots {
+  kPeriodic,  ///< every 9 s of data
+  kOnRequest  ///< when the stage wants one
+};
+
 struct StageSpec {
   std::string name;               ///< the process, for example "gnss_ins_ekf"
   std::vector<InputSpec> inputs;  ///< the index is the rank: at one utime the first is applied first
   std::vector<ClockSpec> clocks;  ///< in order of preference
   std::vector<OutputSpec> outputs;
   int64_t state_layout = 1;  ///< version of what save() writes
+  Snapshots snapshots = Snapshots::kPeriodic;
+  OverloadSpec overload = {};  ///< nothing is skipped where it names no input
 };
 
 /// One input, already checked: decode<T>(bytes) is safe for the type that the spec names.
@@ -92,6 +99,12 @@ class Stage {
   /// on_clock). After load() of it, the same inputs give the same bits. load() throws on bytes that are no such state.
   [[nodiscard]] virtual std::vector<uint8_t> save() const = 0;
   virtual void load(std::span<const uint8_t> state) = 0;
+
+  /// Asked after each publish(), and only where the spec says so: whether save() now is worth its size.
+  [[nodiscard]] virtual bool wants_snapshot() const { return false; }
+
+  /// What the next start of the process may begin with (bus/stage_memory.h). Empty: nothing worth keeping yet.
+  [[nodiscard]] virtual std::vector<uint8_t> memory() const { return {}; }
 
   /// YAML, defaults included.
   [[nodiscard]] virtual std::string effective_config() const = 0;

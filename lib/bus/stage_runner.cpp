@@ -48,25 +48,30 @@ HandlerTiming& StageRunner::measure_time() {
   return *timing_;
 }
 
+/// The message's name; nothing, and an entry in the ledger, where it cannot be decoded.
+std::optional<EventId> StageRunner::check(int input, std::span<const uint8_t> bytes) {
+  const CheckResult result = checks_[static_cast<std::size_t>(input)](bytes);
+  const std::optional<Header> header = read_header(bytes);
+  const bool plausible = header && is_plausible(*header);
+  if (result == CheckResult::kOk && plausible) return EventId{header->utime, header->run, header->seq};
+  // With the wrong fingerprint the bytes behind it name nothing.
+  std::optional<EventId> id;
+  if (plausible && result != CheckResult::kWrongType) id = EventId{header->utime, header->run, header->seq};
+  stream_.note_undecodable(input, id);
+  return std::nullopt;
+}
+
 Offer StageRunner::offer(int input, std::span<const uint8_t> bytes) {
-  const MessageCheck& check = checks_[static_cast<std::size_t>(input)];
-  const CheckResult result = check(bytes);
-  if (result != CheckResult::kOk) {
-    // With the wrong fingerprint the bytes behind it name nothing.
-    std::optional<EventId> id;
-    const std::optional<Header> header = read_header(bytes);
-    if (header && result != CheckResult::kWrongType) id = EventId{header->utime, header->run, header->seq};
-    stream_.note_undecodable(input, id);
-    return Offer::kRefused;
-  }
-  const Header header = *read_header(bytes);
-  if (!is_plausible(header)) {
-    stream_.note_undecodable(input, std::nullopt);
-    return Offer::kRefused;
-  }
-  const Offer offer = stream_.offer(input, {header.utime, header.run, header.seq}, bytes);
-  if (offer == Offer::kTick) tick({input, header.utime, header.run, header.seq, bytes});
+  const std::optional<EventId> id = check(input, bytes);
+  if (!id) return Offer::kRefused;
+  const Offer offer = stream_.offer(input, *id, bytes);
+  if (offer == Offer::kTick) tick({input, id->utime, id->run, id->seq, bytes});
   return offer;
+}
+
+Offer StageRunner::skip(int input, std::span<const uint8_t> bytes) {
+  const std::optional<EventId> id = check(input, bytes);
+  return id ? stream_.skip(input, *id) : Offer::kRefused;
 }
 
 void StageRunner::tick(const Message& sample) {
@@ -88,7 +93,7 @@ void StageRunner::tick(const Message& sample) {
     const HandlerTiming::Scope scope(timing_.get(), handlers + 1);
     stage_->publish(now_utime_, *this);
   }
-  publish_state();
+  publish_state_if_due();
 }
 
 Header StageRunner::stamp(int output) {

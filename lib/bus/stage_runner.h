@@ -31,11 +31,17 @@ class StageRunner : private Outputs {
   /// Takes one message as it came; whatever it is, this does not throw for it.
   Offer offer(int input, std::span<const uint8_t> bytes);
 
+  /// Passes over one message under overload; what cannot be decoded is counted as such.
+  Offer skip(int input, std::span<const uint8_t> bytes);
+
   [[nodiscard]] const StageSpec& spec() const { return stage_->spec(); }
   [[nodiscard]] const Stage& stage() const { return *stage_; }
   [[nodiscard]] const InputStream& stream() const { return stream_; }
   /// Follows a recorded ledger instead of deciding by arrival. `precedent` must outlive the runner.
   void follow(const Precedent* precedent) { stream_.follow(precedent); }
+
+  /// Before the first offer(): the name of the run, where it is not to be the utime of its first tick.
+  void name_run(int64_t run) { stream_.name_run(run); }
 
   /// Goes on from a snapshot: the inputs behind its horizon must come again. Before the first offer(). Throws
   /// std::runtime_error where the state is of another stage or layout, or damaged.
@@ -56,8 +62,10 @@ class StageRunner : private Outputs {
   const provenance_t& provenance() override;
   void send(int output, const char* type, std::span<const uint8_t> bytes) override;
 
+  [[nodiscard]] std::optional<EventId> check(int input, std::span<const uint8_t> bytes);
   void tick(const Message& sample);
   void publish_ledger();
+  void publish_state_if_due();
   void publish_state();
 
   std::unique_ptr<Stage> stage_;

@@ -10,7 +10,7 @@ namespace roadfix {
 namespace {
 
 /// Of the bytes in state_t::state that are the runner's; the stage's own layout is in the message.
-constexpr int64_t kRunnerLayout = 1;
+constexpr int64_t kRunnerLayout = 2;
 
 /// Data time after which the entries of the last minute are published again.
 constexpr int64_t kRepeatLedger_us = 5'000'000;
@@ -50,18 +50,25 @@ void StageRunner::publish_ledger() {
 }
 
 /// After the outputs of its tick, so that the state holds what publishing them has changed.
-void StageRunner::publish_state() {
+void StageRunner::publish_state_if_due() {
+  if (spec().snapshots == Snapshots::kOnRequest) {
+    if (stage_->wants_snapshot()) publish_state();
+    return;
+  }
   const int64_t slot = now_utime_ / kSnapshot_us;
   if (state_slot_ == slot) return;
   const bool first = !state_slot_;
   state_slot_ = slot;
-  if (first) return;  // a start has nothing worth keeping
+  if (!first) publish_state();  // a start has nothing worth keeping
+}
+
+void StageRunner::publish_state() {
   StateWriter writer;
   writer.put(kRunnerLayout);
   stream_.save(writer);
   writer.put(static_cast<int64_t>(next_seq_.size()));
   for (const int64_t seq : next_seq_) writer.put(seq);
-  for (const int64_t value : {next_state_seq_, *state_slot_}) writer.put(value);
+  for (const int64_t value : {next_state_seq_, state_slot_.value_or(0)}) writer.put(value);
   writer.put(std::span<const uint8_t>(stage_->save()));
   state_t state{};
   state.utime = now_utime_;

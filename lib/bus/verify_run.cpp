@@ -16,8 +16,8 @@ constexpr int64_t kNever = std::numeric_limits<int64_t>::min();
 
 class RunVerifier : public MessageSink {
  public:
-  RunVerifier(const NewStage& new_stage, const StageSpec& spec, const StageLog& log, StageRun& run)
-      : new_stage_(new_stage), spec_(spec), log_(log), run_(run), losses_(find_losses(spec, log, run)) {
+  RunVerifier(const NewStage& new_stage, const StageSpec& spec, const StageLog& log, int64_t name, StageRun& run)
+      : new_stage_(new_stage), spec_(spec), log_(log), name_(name), run_(run), losses_(find_losses(spec, log, run)) {
     for (std::size_t i = 0; i < run.outputs.size(); ++i) {
       by_name_.emplace(std::pair(run.outputs[i].output, run.outputs[i].header.seq), i);
     }
@@ -48,6 +48,7 @@ class RunVerifier : public MessageSink {
   const NewStage& new_stage_;
   const StageSpec& spec_;
   const StageLog& log_;
+  int64_t name_;
   StageRun& run_;
   std::vector<LogLoss> losses_;
   std::vector<int64_t> blind_from_;  // per loss: outputs from this utime on may depend on it
@@ -103,6 +104,7 @@ bool RunVerifier::begin(const Start& start) {
   runner_ = std::make_unique<StageRunner>(new_stage_(), *this);
   runner_->follow(&run_.ledger);
   std::vector<std::pair<int, int64_t>> input_runs;
+  runner_->name_run(name_);
   compared_from_ = start.utime();
   if (start.state == nullptr) {
     run_.ledger.begin_from(0, {});
@@ -240,7 +242,7 @@ void RunVerifier::describe(const RecordedOutput& recorded, std::span<const uint8
 
 RunVerdict verify_run(const NewStage& new_stage, const StageSpec& spec, const StageLog& log, int64_t run_name,
                       StageRun& run) {
-  RunVerdict verdict = RunVerifier(new_stage, spec, log, run).verify();
+  RunVerdict verdict = RunVerifier(new_stage, spec, log, run_name, run).verify();
   verdict.run = run_name;
   return verdict;
 }

@@ -10,6 +10,7 @@ ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<
     ++position;
   }
   if (position == static_cast<int>(clocks_.size())) return Verdict::kInput;
+  if (!may_tick && leaps(position, utime)) return Verdict::kRefused;
   if (!first_utime_) first_utime_ = utime;
   std::optional<int64_t>& newest = newest_utime_[static_cast<std::size_t>(position)];
   newest = newest ? std::max(*newest, utime) : utime;
@@ -26,6 +27,18 @@ ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<
   }
   if (ahead && position == active_) rested_ = true;
   return preferred && !ahead ? Verdict::kRefused : Verdict::kInput;
+}
+
+bool ClockChoice::leaps(int position, int64_t utime) {
+  std::optional<int64_t>& last = leap_utime_[static_cast<std::size_t>(position)];
+  const bool far_ahead = utime_ && utime - *utime_ > kLeap_us;
+  const bool confirmed = last && utime > *last && utime - *last <= kLeap_us;
+  if (far_ahead && !confirmed) {
+    last = utime;
+    return true;
+  }
+  last.reset();
+  return false;
 }
 
 bool ClockChoice::may_take_over(int position, int64_t utime) const {
@@ -47,6 +60,8 @@ void ClockChoice::restore(const State& state) {
   first_utime_ = state.first_utime;
   newest_utime_ = state.newest_utime;
   newest_utime_.resize(clocks_.size());
+  leap_utime_ = state.leap_utime;
+  leap_utime_.resize(clocks_.size());
   changed_ = false;
 }
 

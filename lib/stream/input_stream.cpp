@@ -30,24 +30,8 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
     if (!waiting_.insert(id.utime + spec.effect_delay_us, input, id, bytes)) return Offer::kDuplicate;
     return resumed_tick(input, id) ? Offer::kTick : Offer::kWaits;
   }
-  switch (standing(input, id)) {
-    case Standing::kNew:
-      break;
-    case Standing::kDuplicate:
-      ++track.counters.duplicate;
-      return Offer::kDuplicate;
-    case Standing::kMissed:
-      return refuse(input, id, LedgerKind::kLate);
-    case Standing::kConflict:
-      ++track.counters.conflicts;
-      return refuse(input, id, LedgerKind::kRefused);
-  }
-  const InputSpec& spec = inputs_[static_cast<std::size_t>(input)];
-  const int64_t effect_utime = id.utime + spec.effect_delay_us;
-  if (horizon_ && effect_utime <= *horizon_) {
-    settle_late(input, id);
-    return refuse(input, id, spec.effect_delay_us > 0 ? LedgerKind::kUnusedFeedback : LedgerKind::kLate);
-  }
+  if (const std::optional<Offer> turned_away = turn_away(input, id)) return *turned_away;
+  const int64_t effect_utime = id.utime + inputs_[static_cast<std::size_t>(input)].effect_delay_us;
   std::optional<bool> may_tick;
   if (precedent_ != nullptr) {
     may_tick =
@@ -66,6 +50,46 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
   }
   limit_waiting();
   return Offer::kWaits;
+}
+
+Offer InputStream::skip(int input, const EventId& id) {
+  InputTrack& track = track_of(input);
+  ++track.counters.received;
+  track.newest_utime = std::max(track.newest_utime, id.utime);
+  if (precedent_ != nullptr) return Offer::kExcluded;
+  if (const std::optional<Offer> turned_away = turn_away(input, id)) return *turned_away;
+  const int64_t effect_utime = id.utime + inputs_[static_cast<std::size_t>(input)].effect_delay_us;
+  if (!waiting_.insert(effect_utime, input, id, {}, true)) {
+    ++track.counters.duplicate;
+    return Offer::kDuplicate;
+  }
+  ++track.counters.skipped;
+  ledger_.note(LedgerKind::kSkipped, input, id.run, id.seq, id.seq, id.utime);
+  limit_waiting();
+  return Offer::kSkipped;
+}
+
+/// What happens to a message that comes twice, too late, or from a publisher that another has replaced.
+std::optional<Offer> InputStream::turn_away(int input, const EventId& id) {
+  InputTrack& track = track_of(input);
+  switch (standing(input, id)) {
+    case Standing::kNew:
+      break;
+    case Standing::kDuplicate:
+      ++track.counters.duplicate;
+      return Offer::kDuplicate;
+    case Standing::kMissed:
+      return refuse(input, id, LedgerKind::kLate);
+    case Standing::kConflict:
+      ++track.counters.conflicts;
+      return refuse(input, id, LedgerKind::kRefused);
+  }
+  const int64_t delay_us = inputs_[static_cast<std::size_t>(input)].effect_delay_us;
+  if (horizon_ && id.utime + delay_us <= *horizon_) {
+    settle_late(input, id);
+    return refuse(input, id, delay_us > 0 ? LedgerKind::kUnusedFeedback : LedgerKind::kLate);
+  }
+  return std::nullopt;
 }
 
 /// A message may come twice, may have been given up as lost, or may belong to a publisher that another has replaced.
@@ -151,7 +175,11 @@ const WaitingInput* InputStream::next() {
   waiting_.recycle(std::move(current_));
   while (waiting_.front() != nullptr && horizon_ && waiting_.front()->effect_utime <= *horizon_) {
     current_ = waiting_.pop();
-    if (admit(current_)) return &current_;
+    if (current_.skipped) {
+      settle(current_.input, current_.id);
+    } else if (admit(current_)) {
+      return &current_;
+    }
     waiting_.recycle(std::move(current_));
   }
   current_ = {};
@@ -185,14 +213,10 @@ void InputStream::note_undecodable(int input, const std::optional<EventId>& id) 
   ledger_.note(LedgerKind::kUndecodable, input, name.run, name.seq, name.seq, name.utime);
 }
 
-void InputStream::note_skipped(int input, const EventId& id) {
-  ledger_.note(LedgerKind::kSkipped, input, id.run, id.seq, id.seq, id.utime);
-}
-
 void InputStream::limit_waiting() {
   while (waiting_.size() > kMaxWaiting || waiting_.bytes() > kMaxWaitingBytes) {
     WaitingInput oldest = waiting_.pop();
-    refuse(oldest.input, oldest.id, LedgerKind::kRefused);
+    if (!oldest.skipped) refuse(oldest.input, oldest.id, LedgerKind::kRefused);
     waiting_.recycle(std::move(oldest));
   }
 }

@@ -41,6 +41,7 @@ enum class Offer {
   kDuplicate,
   kLate,
   kRefused,
+  kSkipped,
   kExcluded  ///< by the precedent
 };
 
@@ -51,7 +52,13 @@ class InputStream {
   /// Must outlive the stream.
   void follow(const Precedent* precedent) { precedent_ = precedent; }
 
+  /// Names the run that is about to begin; otherwise the utime of its first tick does.
+  void name_run(int64_t run) { run_ = run; }
+
   Offer offer(int input, const EventId& id, std::span<const uint8_t> bytes);
+
+  /// A message that the stage passes over under overload: it moves no clock and is never applied.
+  Offer skip(int input, const EventId& id);
 
   /// The next input that the horizon has reached; null when there is none. Valid until the next call.
   const WaitingInput* next();
@@ -61,10 +68,8 @@ class InputStream {
 
   /// A message that could not be decoded, with its name where that could be read.
   void note_undecodable(int input, const std::optional<EventId>& id);
-  /// A message that the stage passes over under overload.
-  void note_skipped(int input, const EventId& id);
 
-  /// utime of the first tick: names this start of the stage.
+  /// Names this start of the stage.
   [[nodiscard]] std::optional<int64_t> run() const { return run_; }
   [[nodiscard]] std::optional<int64_t> clock_utime() const { return clock_.utime(); }
   [[nodiscard]] std::optional<int> clock_input() const { return clock_.active_input(); }
@@ -92,6 +97,7 @@ class InputStream {
 
   [[nodiscard]] Standing standing(int input, const EventId& id) const;
   [[nodiscard]] bool resumed_tick(int input, const EventId& id) const;
+  std::optional<Offer> turn_away(int input, const EventId& id);
   Offer refuse(int input, const EventId& id, LedgerKind kind);
   void tick(int input, const EventId& id, std::optional<int64_t> last_utime);
   void settle_tick(int input, const EventId& id);

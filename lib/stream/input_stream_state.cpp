@@ -5,17 +5,6 @@ namespace roadfix {
 
 namespace {
 
-void put(StateWriter& writer, const std::optional<int64_t>& value) {
-  writer.put(static_cast<int8_t>(value.has_value()));
-  writer.put(value.value_or(0));
-}
-
-std::optional<int64_t> get_optional(StateReader& reader) {
-  const bool present = reader.get<int8_t>() != 0;
-  const auto value = reader.get<int64_t>();
-  return present ? std::optional(value) : std::nullopt;
-}
-
 /// A count read from a state: no more than what its bytes could hold.
 int64_t get_count(StateReader& reader, int64_t limit) {
   const auto count = reader.get<int64_t>();
@@ -63,12 +52,13 @@ void InputStream::save(StateWriter& writer) const {
   const ClockChoice::State clock = clock_.state();
   writer.put(static_cast<int64_t>(clock.active));
   writer.put(static_cast<int8_t>(clock.rested));
-  put(writer, clock.utime);
-  put(writer, clock.first_utime);
+  writer.put(clock.utime);
+  writer.put(clock.first_utime);
   writer.put(static_cast<int64_t>(clock.newest_utime.size()));
-  for (const std::optional<int64_t>& utime : clock.newest_utime) put(writer, utime);
-  put(writer, run_);
-  put(writer, horizon_);
+  for (const std::optional<int64_t>& utime : clock.newest_utime) writer.put(utime);
+  for (const std::optional<int64_t>& utime : clock.leap_utime) writer.put(utime);
+  writer.put(run_);
+  writer.put(horizon_);
   writer.put(digest_);
   writer.put(ledger_total());
   writer.put(static_cast<int64_t>(ticks_ahead_.size()));
@@ -87,13 +77,16 @@ void InputStream::load(StateReader& reader) {
   ClockChoice::State clock;
   clock.active = static_cast<int>(get_count(reader, static_cast<int64_t>(inputs_.size())));
   clock.rested = reader.get<int8_t>() != 0;
-  clock.utime = get_optional(reader);
-  clock.first_utime = get_optional(reader);
-  const int64_t clocks = get_count(reader, kMaxCount);
-  for (int64_t i = 0; i < clocks; ++i) clock.newest_utime.push_back(get_optional(reader));
+  reader.get(clock.utime);
+  reader.get(clock.first_utime);
+  const auto clocks = static_cast<std::size_t>(get_count(reader, static_cast<int64_t>(inputs_.size())));
+  clock.newest_utime.resize(clocks);
+  clock.leap_utime.resize(clocks);
+  for (std::optional<int64_t>& utime : clock.newest_utime) reader.get(utime);
+  for (std::optional<int64_t>& utime : clock.leap_utime) reader.get(utime);
   clock_.restore(clock);
-  run_ = get_optional(reader);
-  horizon_ = get_optional(reader);
+  reader.get(run_);
+  reader.get(horizon_);
   reader.get(digest_);
   ledger_.start_at(reader.get<int64_t>());
   ticks_ahead_.clear();

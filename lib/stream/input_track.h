@@ -16,6 +16,7 @@ struct InputCounters {
   int64_t duplicate = 0;
   int64_t undecodable = 0;
   int64_t refused = 0;
+  int64_t skipped = 0;
   int64_t conflicts = 0;  ///< refused because another publisher or a repeated log uses the channel
 };
 

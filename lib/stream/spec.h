@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace roadfix {
 
@@ -17,6 +18,12 @@ struct InputSpec {
 struct ClockSpec {
   int input = 0;           ///< index into the inputs
   int64_t timeout_us = 0;  ///< in data time
+};
+
+/// Inputs that a stage may pass over, live, when they come faster than it works; it says so in its ledger.
+struct OverloadSpec {
+  std::vector<int> inputs;
+  int64_t patience = 2;  ///< newer ones that may wait before skipping begins
 };
 
 /// Names one message of a channel and says when it is valid.

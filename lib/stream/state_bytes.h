@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -25,6 +26,12 @@ class StateWriter {
   void put(std::span<const uint8_t> bytes) {
     put(static_cast<int64_t>(bytes.size()));
     put_raw(bytes.data(), bytes.size());
+  }
+  template <class T>
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void put(const std::optional<T>& value) {
+    put(value.has_value());
+    put(value.value_or(T{}));
   }
   /// Of a size that the reader knows.
   template <class Derived>
@@ -59,6 +66,13 @@ class StateReader {
   void get(std::vector<uint8_t>& block) {
     const std::span<const uint8_t> bytes = get_block();
     block.assign(bytes.begin(), bytes.end());
+  }
+  template <class T>
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void get(std::optional<T>& value) {
+    const bool present = get<bool>();
+    value = get<T>();
+    if (!present) value.reset();
   }
   template <class Derived>
   void get(Eigen::PlainObjectBase<Derived>& matrix) {

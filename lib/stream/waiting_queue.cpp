@@ -16,8 +16,9 @@ auto key(const WaitingInput& waiting) {
 
 }  // namespace
 
-bool WaitingQueue::insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes) {
-  WaitingInput waiting{effect_utime, input, id, {}};
+bool WaitingQueue::insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes,
+                          bool skipped) {
+  WaitingInput waiting{effect_utime, input, id, {}, skipped};
   auto place = queue_.end();  // most inputs belong at the end or close to it
   while (place != queue_.begin() && key(waiting) < key(*std::prev(place))) --place;
   if (place != queue_.begin() && key(*std::prev(place)) == key(waiting)) return false;

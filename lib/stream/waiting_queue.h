@@ -16,12 +16,13 @@ struct WaitingInput {
   int input = 0;             ///< also its rank
   EventId id;
   std::vector<uint8_t> bytes;
+  bool skipped = false;  ///< holds its place in the sequence, and is not applied
 };
 
 class WaitingQueue {
  public:
   /// False, and nothing changes, where the same message waits already.
-  bool insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes);
+  bool insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes, bool skipped = false);
 
   [[nodiscard]] const WaitingInput* front() const { return queue_.empty() ? nullptr : &queue_.front(); }
 

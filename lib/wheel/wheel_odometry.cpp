@@ -135,7 +135,10 @@ void WheelOdometry::start(const Tilt& tilt, double tilt_sigma) {
   WheelCovariance& P = state_.P;
   state_.x(kRoll) = tilt.roll;
   state_.x(kPitch) = tilt.pitch;
-  for (int i = 0; i < 3; ++i) decouple(P, kGyroBias + i, s.gyro_bias_std);
+  for (int i = 0; i < 3; ++i) {
+    decouple(P, kGyroBias + i, recalled_ ? known_.gyro_bias_sigma(i) : s.gyro_bias_std);
+    state_.x(kGyroBias + i) = known_.gyro_bias(i);
+  }
   for (int i = 0; i < 2; ++i) decouple(P, kAccelBias + i, s.accel_bias_std);
   decouple(P, kWheelScale, s.wheel_scale_std);
   decouple(P, kSide, s.mounting_std.z());

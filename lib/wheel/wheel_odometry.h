@@ -43,6 +43,12 @@ struct WheelReport {
   bool slipping = false;
 };
 
+/// What outlives the stop of the engine.
+struct WheelMemory {
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();        ///< rad/s
+  Eigen::Vector3d gyro_bias_sigma = Eigen::Vector3d::Zero();  ///< rad/s
+};
+
 class WheelOdometry {
  public:
   explicit WheelOdometry(const WheelConfig& config);
@@ -50,6 +56,11 @@ class WheelOdometry {
   WheelInputStatus add(const ImuSample& imu);
   WheelInputStatus add(const WheelSample& wheels);
   WheelInputStatus add(const MagSample& mag);
+
+  /// Nothing before the gyro's bias is known twice as well as the calibration tells it.
+  [[nodiscard]] std::optional<WheelMemory> memory() const;
+  /// Begins the next start with what was known when the engine was stopped. Once started, it changes nothing.
+  void recall(const WheelMemory& memory);
 
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] Odometry odometry() const;
@@ -88,6 +99,8 @@ class WheelOdometry {
   WheelConfig config_;
   WheelState state_;
   bool started_ = false;
+  bool recalled_ = false;
+  WheelMemory known_;                               ///< where recalled, with what a bias changes between two starts
   int64_t t_us_ = 0;                                ///< of the state
   std::optional<int64_t> imu_us_;                   ///< of the newest imu sample
   std::optional<int64_t> wheels_us_;                ///< of the newest wheel sample

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kLostSpeedSigma = 3.0;  ///< m/s: the speed is no longer known
 constexpr double kLostYawSigma = 0.8;    ///< rad: neither is the direction
+constexpr double kTurnOnChange = 0.3;    ///< of a bias's spread: what it changes from one start to the next (assumed)
 
 /// Rotation error in vehicle axes by (roll, pitch, yaw) errors: the inverse of the Euler rates' matrix (M.28).
 Eigen::Matrix3d rotation_by_angles(const Tilt& tilt) { return euler_rates_by_omega(tilt).inverse(); }
@@ -81,6 +82,25 @@ WheelReport WheelOdometry::report() const {
   return r;
 }
 
+std::optional<WheelMemory> WheelOdometry::memory() const {
+  WheelMemory memory;
+  for (int i = 0; i < 3; ++i) memory.gyro_bias_sigma(i) = state_.sigma(kGyroBias + i);
+  if (!started_ || memory.gyro_bias_sigma.maxCoeff() > 0.5 * config_.sensors.gyro_bias_std) return std::nullopt;
+  memory.gyro_bias = state_.x.segment<3>(kGyroBias);
+  return memory;
+}
+
+void WheelOdometry::recall(const WheelMemory& memory) {
+  const bool sane =
+      memory.gyro_bias.allFinite() && memory.gyro_bias_sigma.allFinite() && memory.gyro_bias_sigma.minCoeff() >= 0.0;
+  if (started_ || !sane) return;
+  const double spread = config_.sensors.gyro_bias_std, change = kTurnOnChange * spread;
+  recalled_ = true;
+  known_.gyro_bias = memory.gyro_bias;
+  for (int i = 0; i < 3; ++i)
+    known_.gyro_bias_sigma(i) = std::min(spread, std::hypot(memory.gyro_bias_sigma(i), change));
+}
+
 template <class Self, class Visitor>
 void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
   visit(self.state_.x, self.state_.P, self.started_, self.t_us_, self.imu_us_, self.wheels_us_, self.first_us_);
@@ -92,38 +112,15 @@ void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
   visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_);
   visit(self.align_force_, self.align_time_, self.block_gyro_, self.block_time_);
   visit(self.mag_us_, self.mag_strength_, self.mag_dip_, self.reset_counter_);
+  visit(self.recalled_, self.known_.gyro_bias, self.known_.gyro_bias_sigma);
 }
-
-namespace {
-
-template <class T>
-void write(StateWriter& w, const T& value) {
-  w.put(value);
-}
-template <class T>
-void write(StateWriter& w, const std::optional<T>& value) {
-  w.put(value.has_value());
-  w.put(value.value_or(T{}));
-}
-template <class T>
-void read(StateReader& r, T& value) {
-  r.get(value);
-}
-template <class T>
-void read(StateReader& r, std::optional<T>& value) {
-  const bool has = r.get<bool>();
-  value = r.get<T>();
-  if (!has) value.reset();
-}
-
-}  // namespace
 
 void WheelOdometry::save(StateWriter& writer) const {
-  visit_members(*this, [&](const auto&... members) { (write(writer, members), ...); });
+  visit_members(*this, [&](const auto&... members) { (writer.put(members), ...); });
 }
 
 void WheelOdometry::load(StateReader& reader) {
-  visit_members(*this, [&](auto&... members) { (read(reader, members), ...); });
+  visit_members(*this, [&](auto&... members) { (reader.get(members), ...); });
 }
 
 }  // namespace roadfix

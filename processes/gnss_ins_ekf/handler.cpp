@@ -25,7 +25,10 @@ enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 class GnssInsStage final : public Stage {
  public:
   GnssInsStage(const Calibration& calibration, const GnssInsProcessConfig& config)
-      : config_(config), pose_slot_(config.publish_period), status_slot_(config.status_period) {
+      : config_(config),
+        calibration_(calibration_text(calibration)),
+        pose_slot_(config.publish_period),
+        status_slot_(config.status_period) {
     static_cast<GnssInsTuning&>(filter_config_) = config.tuning;
     filter_config_.vehicle = gnss_ins_vehicle(calibration);
     // Without the declination a magnetic heading is not a heading.
@@ -104,9 +107,11 @@ class GnssInsStage final : public Stage {
   }
 
   [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+  [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
   GnssInsProcessConfig config_;
+  std::string calibration_;
   GnssInsConfig filter_config_;
   StageSpec spec_;
   std::optional<GnssIns> filter_;

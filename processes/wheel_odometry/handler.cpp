@@ -5,6 +5,7 @@
 #include <roadfix/imu_t.hpp>
 #include <roadfix/mag_t.hpp>
 #include <roadfix/pose_t.hpp>
+#include <roadfix/state_t.hpp>
 #include <roadfix/wheels_t.hpp>
 #include <variant>
 
@@ -17,7 +18,7 @@
 namespace roadfix {
 namespace {
 
-enum Input { kImu = 0, kWheels = 1, kMag = 2 };
+enum Input { kImu = 0, kWheels = 1, kMag = 2, kStart = 3 };
 using Sample = std::variant<ImuSample, WheelSample, MagSample>;
 
 Sample sample_of(const Message& message) {
@@ -51,11 +52,16 @@ class WheelOdometryStage final : public Stage {
  public:
   WheelOdometryStage(const Calibration& calibration, const WheelOdometryConfig& config)
       : config_(config),
+        calibration_(calibration_text(calibration)),
         on_rear_axle_(calibration.body_origin == BodyOrigin::kRearAxle),
         slot_(config.publish_period),
         odometry_({wheel_sensors(calibration), config.odometry}) {
     spec_.name = "wheel_odometry";
-    spec_.inputs = {{"IMU", "imu_t", 0, 0}, {"WHEELS", "wheels_t", 50'000, 0}, {"MAG", "mag_t", 50'000, 0}};
+    spec_.inputs = {{"IMU", "imu_t", 0, 0},
+                    {"WHEELS", "wheels_t", 50'000, 0},
+                    {"MAG", "mag_t", 50'000, 0},
+                    {"START_WHEEL_ODOMETRY", "state_t", 0, 0}};
+    spec_.state_layout = 2;
     spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_WHEEL", "pose_t"}};
   }
@@ -63,6 +69,7 @@ class WheelOdometryStage final : public Stage {
   [[nodiscard]] const StageSpec& spec() const override { return spec_; }
 
   void apply(const Message& message) override {
+    if (message.input == kStart) return recall(decode<state_t>(message.bytes).state);
     while (!ahead_.empty() && ahead_.front().utime <= message.utime) ahead_.pop_front();
     add(odometry_, sample_of(message));
   }
@@ -109,7 +116,17 @@ class WheelOdometryStage final : public Stage {
     ahead_.clear();
   }
 
+  [[nodiscard]] std::vector<uint8_t> memory() const override {
+    StateWriter writer;
+    if (const std::optional<WheelMemory> memory = odometry_.memory()) {
+      writer.put(memory->gyro_bias);
+      writer.put(memory->gyro_bias_sigma);
+    }
+    return writer.take();
+  }
+
   [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+  [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
   /// A clock sample that the horizon has not reached.
@@ -118,11 +135,21 @@ class WheelOdometryStage final : public Stage {
     Sample sample;
   };
 
+  void recall(const std::vector<uint8_t>& bytes) {
+    WheelMemory memory;
+    if (bytes.size() != 6 * sizeof(double)) return;  // written by another version
+    StateReader reader(bytes);
+    reader.get(memory.gyro_bias);
+    reader.get(memory.gyro_bias_sigma);
+    odometry_.recall(memory);
+  }
+
   static void add(WheelOdometry& odometry, const Sample& sample) {
     std::visit([&](const auto& s) { (void)odometry.add(s); }, sample);
   }
 
   WheelOdometryConfig config_;
+  std::string calibration_;
   bool on_rear_axle_;
   PublishSlot slot_;
   StageSpec spec_;

@@ -23,12 +23,14 @@ struct Ear {
   }
 };
 
+std::unique_ptr<Stage> make_filter() { return std::make_unique<ChainStage>(filter_spec()); }
+
 }  // namespace
 
 TEST_CASE("a stage on a bus publishes outputs, ledger, heartbeat and configuration") {
   MemoryBus bus;
   Ear ear(bus);
-  LiveStage live(std::make_unique<ChainStage>(filter_spec()), bus);
+  LiveStage live(make_filter, bus);
   live.step(std::chrono::milliseconds(0));
   const heartbeat_t starting = decode<heartbeat_t>(ear.heard["HEARTBEAT_FILTER"].at(0));
   REQUIRE(starting.state == heartbeat_t::STATE_STARTING);
@@ -72,7 +74,7 @@ TEST_CASE("a stage on a bus publishes outputs, ledger, heartbeat and configurati
 TEST_CASE("a message with impossible numbers is undecodable") {
   MemoryBus bus;
   Ear ear(bus);
-  LiveStage live(std::make_unique<ChainStage>(filter_spec()), bus);
+  LiveStage live(make_filter, bus);
   for (const DriveMessage& message : small_drive(2.0)) bus.publish(message.channel, message.bytes);
   for (const int64_t extreme : {std::numeric_limits<int64_t>::max(), std::numeric_limits<int64_t>::min()}) {
     for (int64_t imu_t::*field : {&imu_t::utime, &imu_t::run, &imu_t::seq}) {
@@ -91,7 +93,7 @@ TEST_CASE("a message with impossible numbers is undecodable") {
 TEST_CASE("two publishers on a channel are said") {
   MemoryBus bus;
   Ear ear(bus);
-  LiveStage live(std::make_unique<ChainStage>(filter_spec()), bus);
+  LiveStage live(make_filter, bus);
   for (const DriveMessage& message : small_drive(2.0)) {
     bus.publish(message.channel, message.bytes);
     if (message.channel != "WHEELS") continue;

@@ -116,7 +116,8 @@ TEST_CASE("truncated at any byte: all whole events come back and the rest is rep
     LogReader reader(folder / "a.lcm");
     while (const auto event = reader.next()) ends.push_back(event->offset + log_event_bytes(*event));
   }
-  for (std::size_t size = whole.size() - 400; size <= whole.size(); ++size) {
+  // The last events byte by byte, the whole file in strides that meet every place of an event.
+  for (std::size_t size = 0; size <= whole.size(); size += size + 400 < whole.size() ? 11 : 1) {
     write_bytes(folder / "b.lcm", whole.substr(0, size));
     LogReader reader(folder / "b.lcm");
     const auto expected = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), size) - ends.begin()) - 1;

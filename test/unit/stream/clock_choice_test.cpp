@@ -83,6 +83,35 @@ TEST_CASE("what a record says replaces the time-outs") {
   REQUIRE(clock.offer(kWheel, 1012, false) == Verdict::kInput);
 }
 
+TEST_CASE("a stamp far in the future is refused, and costs nothing but itself") {
+  const int64_t leap = ClockChoice::kLeap_us;
+  ClockChoice clock = three_clocks();
+  REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
+  REQUIRE(clock.offer(kIns, 1000 + leap + 1) == Verdict::kRefused);
+  REQUIRE(clock.offer(kIns, 1010) == Verdict::kTick);
+  REQUIRE(clock.offer(kVo, 1000 + 50 * leap) == Verdict::kRefused);
+  REQUIRE(clock.offer(kVo, 1120) == Verdict::kTick);  // the wild stamps of neither keep it from taking over
+  REQUIRE(clock.offer(kIns, 1120 + leap) == Verdict::kTick);
+}
+
+TEST_CASE("a gap longer than a leap is bridged by the second sample behind it") {
+  const int64_t leap = ClockChoice::kLeap_us;
+  ClockChoice clock = three_clocks();
+  REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
+  REQUIRE(clock.offer(kIns, 1000 + 6 * leap) == Verdict::kRefused);
+  REQUIRE(clock.offer(kIns, 1000 + 6 * leap) == Verdict::kRefused);  // the same again confirms nothing
+  REQUIRE(clock.offer(kIns, 1000 + 9 * leap) == Verdict::kRefused);  // nor does another leap
+  ClockChoice restored = three_clocks();
+  restored.restore(clock.state());
+  for (ClockChoice* c : {&clock, &restored}) {
+    REQUIRE(c->offer(kIns, 1010 + 9 * leap) == Verdict::kTick);
+    REQUIRE(c->offer(kIns, 1020) == Verdict::kRefused);
+  }
+  ClockChoice recorded = three_clocks();  // verify takes the ledger's word
+  REQUIRE(recorded.offer(kIns, 1000, true) == Verdict::kTick);
+  REQUIRE(recorded.offer(kIns, 1010 + 9 * leap, true) == Verdict::kTick);
+}
+
 TEST_CASE("a restored choice goes on as the saved one") {
   ClockChoice clock = three_clocks();
   clock.offer(kIns, 1000);

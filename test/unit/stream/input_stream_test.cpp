@@ -167,17 +167,36 @@ TEST_CASE("feedback takes effect after its delay; later than that it goes unused
   REQUIRE(entries(stream, LedgerKind::kUnusedFeedback).size() == 1);
 }
 
-TEST_CASE("what cannot be decoded or is skipped goes to the ledger") {
+TEST_CASE("what cannot be decoded goes to the ledger") {
   InputStream stream = make_stream();
   tick_until(stream, 50);
   stream.note_undecodable(kSlow, EventId{40, kRun, 9});
   stream.note_undecodable(kSlow, std::nullopt);
-  stream.note_skipped(kSlow, {41, kRun, 10});
   tick_until(stream, 60);
   REQUIRE(entries(stream, LedgerKind::kUndecodable).size() == 2);
   REQUIRE(entries(stream, LedgerKind::kUndecodable)[0].first_seq == 9);
-  REQUIRE(entries(stream, LedgerKind::kSkipped).size() == 1);
   REQUIRE(stream.track(kSlow).counters.undecodable == 2);
+}
+
+TEST_CASE("what is skipped under overload moves no clock, is not applied, and is no loss") {
+  InputStream stream = make_stream();
+  std::vector<Applied> applied;
+  tick_until(stream, 50);
+  REQUIRE(stream.skip(kClock, {60, kRun, 6}) == Offer::kSkipped);
+  REQUIRE(stream.skip(kSlow, {55, kRun, 0}) == Offer::kSkipped);
+  REQUIRE(stream.clock_utime() == 50);
+  REQUIRE(offer(stream, kClock, 60, 6) == Offer::kDuplicate);
+  REQUIRE(stream.skip(kSlow, {55, kRun, 0}) == Offer::kDuplicate);
+  REQUIRE(stream.skip(kSlow, {0, kRun, -1}) == Offer::kLate);
+  for (int64_t t = 70; t <= 200; t += 10) REQUIRE(offer(stream, kClock, t, t / 10, &applied) == Offer::kTick);
+  REQUIRE(std::count(applied.begin(), applied.end(), Applied{kClock, 60, 6}) == 0);
+  REQUIRE(std::count(applied.begin(), applied.end(), Applied{kClock, 70, 7}) == 1);
+  const std::vector<LedgerEntry> skipped = entries(stream, LedgerKind::kSkipped);
+  REQUIRE(skipped.size() == 2);
+  REQUIRE((skipped[0].input == kClock && skipped[0].first_seq == 6 && skipped[0].at_clock_utime == 70));
+  REQUIRE(entries(stream, LedgerKind::kLost).empty());
+  REQUIRE((stream.track(kClock).counters.skipped == 1 && stream.track(kClock).counters.lost == 0));
+  REQUIRE(stream.track(kSlow).counters.skipped == 1);
 }
 
 TEST_CASE("a silent clock does not fill the memory") {

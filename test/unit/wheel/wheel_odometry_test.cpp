@@ -287,6 +287,38 @@ TEST_CASE("a snapshot continues with the same bits") {
   CHECK(resumed.state().P == whole.state().P);
 }
 
+TEST_CASE("a start in motion with the bias of the last drive keeps its direction; once started it changes nothing") {
+  double with = 0.0, without = 0.0;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const ScenarioConfig s = scenario_of("city_loop", 100.0);
+    const SimulatedDrive drive = simulate(s, seed);
+    WheelOdometry first(matching_config(s));
+    REQUIRE_FALSE(first.memory());
+    run(drive, first, [](const WheelOdometry&) {});
+    const std::optional<WheelMemory> memory = first.memory();
+    REQUIRE(memory);
+    SimulatedDrive rest = drive;  // the same sensors, switched on while the car drives
+    const int64_t from_us = drive.imu.front().t_us + 50'000'000;
+    std::erase_if(rest.imu, [&](const ImuSample& x) { return x.t_us < from_us; });
+    std::erase_if(rest.wheels, [&](const WheelSample& x) { return x.t_us < from_us; });
+    std::erase_if(rest.mag, [&](const MagSample& x) { return x.t_us < from_us; });
+    for (const bool recalls : {false, true}) {
+      WheelOdometry odometry(matching_config(s));
+      if (recalls) odometry.recall(*memory);
+      LevelTruth truth(rest);
+      run(rest, odometry, [&](const WheelOdometry& o) {
+        if (!truth.started()) truth.start(o.odometry().t_us);
+      });
+      (recalls ? with : without) += std::abs(truth.error(odometry.odometry())(5));
+      const WheelState before = odometry.state();
+      odometry.recall({Eigen::Vector3d::Ones(), Eigen::Vector3d::Ones()});
+      CHECK(odometry.state().x == before.x);
+    }
+  }
+  INFO("yaw error at the end, rad: with " << with << ", without " << without);
+  CHECK(with < 0.5 * without);
+}
+
 TEST_CASE("shifting all times shifts the result and no bit of it") {
   const ScenarioConfig s = scenario_of("city_loop", 20.0);
   const SimulatedDrive drive = simulate(s, 17);
