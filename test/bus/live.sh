@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Three stages on real UDP in a network namespace of their own, recorded by lcm-logger, then verified: nothing may differ.
-# In ip_loss the stages live in a second namespace, behind a link that drops 0.1 % of the packets.
-#   live.sh BIN clean|starved|killed|late_recording|ip_loss
+# Three stages on real UDP in a network namespace of their own, recorded by lcm-logger and by our recorder (split every
+# 4 s), then both recordings are verified: nothing may differ. In ip_loss the stages live in a second namespace, behind a
+# link that drops 0.1 % of the packets.
+#   live.sh BIN clean|starved|killed|silent_clock|late_recording|ip_loss
 set -euo pipefail
 bin=$1; trouble=$2
 if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
@@ -31,32 +32,54 @@ starved_url=$url; [[ $trouble == starved ]] && starved_url+='&recv_buf_size=2500
 declare -A stage
 start() { "${there[@]}" "$bin/chain_process" --config "/$1" --bus "${2:-$url}" 2>>"$folder/stages.err" & stage[$1]=$!; }
 
-record() { lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/null 2>&1 & logger=$!; }
+mkdir "$folder/vehicle"
+printf 'split_time_s: 4\nmin_free_gib: 0\n' >"$folder/vehicle/recorder.yaml"
+record() {
+  lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/logger.lcm" >/dev/null 2>&1 & logger=$!
+  "$bin/recorder" --config "$folder/vehicle" --folder "$folder/ours" --bus "$url" >/dev/null 2>>"$folder/stages.err" & recorder=$!
+}
 [[ $trouble == late_recording ]] || record
 for name in odometry fusion; do start $name; done
 start filter "$starved_url"
 sleep 1
-"$bin/play_drive" "$url" 24 & player=$!
+player=("$bin/play_drive" "$url")
 case $trouble in
-  starved) for _ in 1 2 3 4; do sleep 3; kill -STOP "${stage[filter]}"; sleep 1; kill -CONT "${stage[filter]}"; done ;;
-  killed) sleep 8.3; kill -KILL "${stage[filter]}"; wait "${stage[filter]}" 2>/dev/null || true; sleep 1.5; start filter ;;
+  silent_clock) player+=(14 IMU 5 8) ;;
+  killed | starved) player+=(16) ;;
+  late_recording) player+=(19) ;;
+  *) player+=(12) ;;
+esac
+"${player[@]}" & player=$!
+case $trouble in
+  starved) for _ in 1 2 3; do sleep 3; kill -STOP "${stage[filter]}"; sleep 1; kill -CONT "${stage[filter]}"; done ;;
+  killed) sleep 6.3; kill -KILL "${stage[filter]}"; wait "${stage[filter]}" 2>/dev/null || true; sleep 1.5; start filter ;;
   late_recording) sleep 3; record ;;
 esac
 wait $player
 sleep 0.5
 for pid in "${stage[@]}"; do kill -INT "$pid"; done
 for pid in "${stage[@]}"; do wait "$pid" || { echo "a stage ended with $?"; cat "$folder/stages.err"; exit 1; }; done
-sleep 0.5; kill -INT $logger; wait $logger || true
+sleep 0.5; kill -INT $logger; kill -TERM $recorder; wait $logger || true
+wait $recorder || { echo "the recorder ended with $?"; cat "$folder/stages.err"; exit 1; }
 grep -v 'bytes; large messages may be lost\|receive buffer\|LCM' "$folder/stages.err" || true
-"$bin/verify_chain" "$folder/drive.lcm" | tee "$folder/verdict"
-read -r _ identical _ differing _ unverifiable < <(tail -n 1 "$folder/verdict")
 fail() { echo "live $trouble: $*"; exit 1; }
-[[ $differing -eq 0 ]] || fail 'something differs'
-[[ $identical -gt 2000 ]] || fail 'too little was verified'
+[[ $(ls "$folder"/ours/*.lcm | wc -l) -ge 3 ]] || fail 'the recorder did not split its log'
+for recording in logger ours; do
+  logs=("$folder"/$recording*.lcm); [[ $recording == logger ]] || logs=("$folder"/ours/*.lcm)
+  echo "-- recorded by $recording: ${#logs[@]} files"
+  "$bin/verify_chain" "${logs[@]}" | tee "$folder/verdict" || true
+  read -r _ identical _ differing _ unverifiable < <(tail -n 1 "$folder/verdict")
+  [[ $differing -eq 0 ]] || fail 'something differs'
+  [[ $identical -gt 1500 ]] || fail 'too little was verified'
+  # On a busy machine lcm-logger itself loses messages; without that, and from the beginning, everything can be verified.
+  if ! grep -q 'lost by the logger' "$folder/verdict" && [[ $trouble != late_recording ]]; then
+    [[ $unverifiable -eq 0 ]] || fail 'unverifiable, but the logger lost nothing'
+  fi
+done
 if [[ $trouble == ip_loss ]]; then
   echo "dropped on the way: $("${there[@]}" nft list chain ip loss in | grep -o 'packets [0-9]*')"
-fi
-# On a busy machine lcm-logger itself loses messages; without that, and from the beginning, everything can be verified.
-if ! grep -q 'lost by the logger' "$folder/verdict" && [[ $trouble != late_recording ]]; then
-  [[ $unverifiable -eq 0 ]] || fail 'unverifiable, but the logger lost nothing'
+elif [[ $trouble == silent_clock ]]; then
+  grep -q '^filter: [1-9][0-9]* heartbeats without a clock' "$folder/verdict" || fail 'nobody said that the clock was silent'
+elif [[ $trouble == clean ]]; then
+  ! grep -q 'without a clock' "$folder/verdict" || fail 'the clock was called silent'
 fi

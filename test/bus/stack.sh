@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The shipped stages live on the demo drive, played by lcm-logplayer, recorded by lcm-logger, then verified.
-# Prints the lines of roadfix verify; fails where anything differs.
+# The shipped stages live on the demo drive, played by lcm-logplayer, recorded by lcm-logger and by our recorder, then both
+# recordings are verified; and again with one value of configuration and calibration changed, which must be named.
+# Prints the lines of roadfix verify (of lcm-logger's recording last); fails where anything differs.
 #   stack.sh BIN CONFIG LOG [SECONDS]
 set -euo pipefail
 bin=$1; config=$(realpath "$2"); log=$(realpath "$3"); seconds=${4:-20}
@@ -14,6 +15,8 @@ folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$folder"
 url='udpm://239.255.76.67:7667?ttl=0'
 "$bin/roadfix" log cut "$log" --to-s "$seconds" --out "$folder/cut.lcm" >/dev/null
 lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/null 2>&1 & logger=$!
+mkdir "$folder/vehicle"; printf 'min_free_gib: 0\n' >"$folder/vehicle/recorder.yaml"
+"$bin/recorder" --config "$folder/vehicle" --folder "$folder/ours" --bus "$url" >/dev/null 2>>"$folder/stages.err" & recorder=$!
 stages=()
 for name in wheel_odometry gnss_ins_ekf imm_fusion; do
   "$bin/$name" --config "$config" --bus "$url" 2>>"$folder/stages.err" & stages+=($!)
@@ -23,5 +26,14 @@ lcm-logplayer --lcm-url="$url" "$folder/cut.lcm" >/dev/null 2>&1
 sleep 0.5
 for pid in "${stages[@]}"; do kill -INT "$pid"; done
 for pid in "${stages[@]}"; do wait "$pid" || { echo "a stage ended with $?"; cat "$folder/stages.err"; exit 1; }; done
-sleep 0.5; kill -INT $logger; wait $logger || true
+sleep 0.5; kill -INT $logger; kill -TERM $recorder; wait $logger || true
+wait $recorder || { echo "the recorder ended with $?"; cat "$folder/stages.err"; exit 1; }
+cp -r "$config" "$folder/changed"
+echo 'publish_period_s: 0.05' >"$folder/changed/wheel_odometry.yaml"
+sed -i 's/speed_noise_mps: 0.03/speed_noise_mps: 0.04/' "$folder/changed/calibration.yaml"
+if "$bin/roadfix" verify "$folder/drive.lcm" --config "$folder/changed" >"$folder/verdict"; then echo 'a changed configuration passes'; exit 1; fi
+for said in "configuration: 'publish_period_s: 0.02' in the car, 'publish_period_s: 0.05' here" 'calibration: .*speed_noise_mps: 0.04'; do
+  grep -q "not the same as in the car: $said" "$folder/verdict" || { cat "$folder/verdict"; echo "not said: $said"; exit 1; }
+done
+"$bin/roadfix" verify "$folder"/ours/*.lcm --config "$config"
 "$bin/roadfix" verify "$folder/drive.lcm" --config "$config"
