@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The shipped stages live on the demo drive, played by lcm-logplayer, recorded by lcm-logger and by our recorder, then both
 # recordings are verified; and again with one value of configuration and calibration changed, which must be named.
-# Prints the lines of roadfix verify (of lcm-logger's recording last); fails where anything differs.
+# Prints the lines of roadfix verify (of our recorder's recording last); fails where anything differs.
 #   stack.sh BIN CONFIG LOG [SECONDS]
 set -euo pipefail
 bin=$1; config=$(realpath "$2"); log=$(realpath "$3"); seconds=${4:-20}
@@ -35,5 +35,5 @@ if "$bin/roadfix" verify "$folder/drive.lcm" --config "$folder/changed" >"$folde
 for said in "configuration: 'publish_period_s: 0.02' in the car, 'publish_period_s: 0.05' here" 'calibration: .*speed_noise_mps: 0.04'; do
   grep -q "not the same as in the car: $said" "$folder/verdict" || { cat "$folder/verdict"; echo "not said: $said"; exit 1; }
 done
-"$bin/roadfix" verify "$folder"/ours/*.lcm --config "$config"
 "$bin/roadfix" verify "$folder/drive.lcm" --config "$config"
+"$bin/roadfix" verify "$folder"/ours/*.lcm --config "$config"
