@@ -63,7 +63,8 @@ bool LedgerRecord::unsettled_at_end(int input, const EventId& id) const {
   const auto i = static_cast<std::size_t>(input);
   if (last_utime_ == 0 || i >= last_seq_.size() || id.seq <= last_seq_[i]) return false;
   const int64_t effect_utime = id.utime + spec_.inputs[i].effect_delay_us;
-  return id.utime > last_utime_ - kEnd_us && effect_utime <= last_utime_ - lateness_us_;
+  const bool recent = id.utime > last_utime_ - kEnd_us || last_seq_[i] < 0;
+  return recent && effect_utime <= last_utime_ - lateness_us_;
 }
 
 bool LedgerRecord::excludes(int input, const EventId& id) const {

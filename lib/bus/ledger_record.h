@@ -24,7 +24,8 @@ class LedgerRecord : public Precedent {
   void begin_from(int64_t entries, const std::vector<std::pair<int, int64_t>>& input_runs);
 
   /// The run ended with this output: what its ledger had no time to tell. Inputs of the last 10 s that the horizon had
-  /// passed, but that lie behind the last ones applied, were not there in time.
+  /// passed, but that lie behind the last ones applied, were not there in time; nor were older ones of a channel of
+  /// which none was ever applied.
   void end_with(int64_t last_utime, const provenance_t& provenance);
 
   [[nodiscard]] bool accepts(int input, const EventId& id) const override;

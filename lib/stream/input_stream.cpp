@@ -22,7 +22,6 @@ InputStream::InputStream(std::vector<InputSpec> inputs, std::vector<ClockSpec> c
 Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> bytes) {
   InputTrack& track = track_of(input);
   ++track.counters.received;
-  track.newest_utime = std::max(track.newest_utime, id.utime);
   if (precedent_ != nullptr && !precedent_->accepts(input, id)) return Offer::kExcluded;
   if (resumes_at_ && id.utime <= *resumes_at_) {
     const InputSpec& spec = inputs_[static_cast<std::size_t>(input)];
@@ -44,6 +43,7 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
     ++track.counters.duplicate;
     return Offer::kDuplicate;
   }
+  track.newest_utime = std::max(track.newest_utime, id.utime);
   if (verdict == ClockChoice::Verdict::kTick) {
     tick(input, id, last_utime);
     return Offer::kTick;
@@ -55,7 +55,6 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
 Offer InputStream::skip(int input, const EventId& id) {
   InputTrack& track = track_of(input);
   ++track.counters.received;
-  track.newest_utime = std::max(track.newest_utime, id.utime);
   if (precedent_ != nullptr) return Offer::kExcluded;
   if (const std::optional<Offer> turned_away = turn_away(input, id)) return *turned_away;
   const int64_t effect_utime = id.utime + inputs_[static_cast<std::size_t>(input)].effect_delay_us;
@@ -64,6 +63,7 @@ Offer InputStream::skip(int input, const EventId& id) {
     return Offer::kDuplicate;
   }
   ++track.counters.skipped;
+  track.newest_utime = std::max(track.newest_utime, id.utime);
   ledger_.note(LedgerKind::kSkipped, input, id.run, id.seq, id.seq, id.utime);
   limit_waiting();
   return Offer::kSkipped;
