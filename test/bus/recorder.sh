@@ -10,7 +10,7 @@ if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
 fi
 ip link set lo up && ip route add 224.0.0.0/4 dev lo
 folder=$(mktemp -d); disk=$folder/disk
-trap 'kill $(jobs -p) 2>/dev/null || true; umount "$disk" 2>/dev/null || true; rm -rf "$folder"' EXIT
+trap 'kill $(jobs -p) 2>/dev/null || true; wait; umount "$disk" 2>/dev/null || true; rm -rf "$folder"' EXIT
 fail() { echo "recorder $trouble: $*"; exit 1; }
 url='udpm://239.255.76.67:7667?ttl=0'
 seconds=5; [[ $trouble == full ]] && seconds=9
