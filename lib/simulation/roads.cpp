@@ -108,6 +108,8 @@ std::vector<WayPoint> way_points(RouteKind route, double duration_s) {
       return long_city(duration_s);
     case RouteKind::kCorridor:
       return corridor(duration_s);
+    case RouteKind::kTurn:
+      return {{0, 0, 0, 13.9, 3, false}, {890, 0, 40, 13.9, 0, false}, {890, 1000, 0, 13.9, 0, false}};
   }
   return {};
 }

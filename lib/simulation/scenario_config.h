@@ -22,6 +22,7 @@ enum class RouteKind {
   kLongCity,         ///< half an hour of city streets with stops
   kTunnel,           ///< main road for the tunnel scenarios
   kCorridor,         ///< indoors at walking pace, tight corners
+  kTurn,             ///< a minute straight on at constant speed, then a right angle
 };
 
 struct MotionConfig {
@@ -137,7 +138,8 @@ void visit(MotionConfig& c, Visitor& v) {
             {"cold_start_moving", RouteKind::kColdStartMoving},
             {"long_city", RouteKind::kLongCity},
             {"tunnel", RouteKind::kTunnel},
-            {"corridor", RouteKind::kCorridor}});
+            {"corridor", RouteKind::kCorridor},
+            {"turn", RouteKind::kTurn}});
   v.number("speed_factor", c.speed_factor, 0.05, 3.0);
   v.number("acceleration_mps2", c.acceleration_mps2, 0.1, 10.0);
   v.number("braking_mps2", c.braking_mps2, 0.1, 10.0);

@@ -96,6 +96,11 @@ const std::vector<Scenario>& scenarios() {
       {"tunnel_dark", "the same with a dark tunnel", set_tunnel},
       {"long_city", "half an hour of city streets, with bridges, tunnels, slip and disturbed fields", set_long_city},
       {"demo", "90 s: open, bridge, tunnel, open; the drive of logs/demo.lcm", set_demo},
+      {"turn", "a minute straight on at constant speed, then a right angle",
+       [](ScenarioConfig& c) {
+         c.motion.route = RouteKind::kTurn;
+         c.duration_s = 90.0;
+       }},
       {"corridor", "indoors at walking pace, without GNSS",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kCorridor;
