@@ -92,6 +92,7 @@ void visit(CameraCalibration& c, Visitor& v) {
           "fx and fy (of fx fy cx cy) must be positive");
   v.optional_group("distortion", c.distortion);
   v.optional_choice("colour", c.colour, {{"gray", CameraColour::kGray}, {"bgr", CameraColour::kBgr}});
+  v.optional_number("time_offset_s", c.time_offset, -kMaxSeconds, kMaxSeconds);
   v.optional_number("time_offset_std_s", c.time_offset_std, 0.0, kMaxSeconds);
   v.optional_number("stamp_jitter_s", c.stamp_jitter, 0.0, kMaxSeconds);
   v.optional_group("T_body_camera", c.mounting);

@@ -76,6 +76,7 @@ struct CameraCalibration {
   std::optional<Eigen::Vector4d> intrinsics_px;  ///< fx fy cx cy
   std::optional<CameraDistortion> distortion;
   std::optional<CameraColour> colour;
+  std::optional<double> time_offset;      ///< s: IMU time = stamp + this
   std::optional<double> time_offset_std;  ///< s, of its stamps against the IMU's
   std::optional<double> stamp_jitter;     ///< s
   std::optional<CameraMounting> mounting;
