@@ -1,0 +1,124 @@
+/// Visual-inertial odometry: a multi-state constraint Kalman filter (Mourikis and Roumeliotis 2007) with the
+/// right-invariant error, long-lived points, what is known about cars, and online calibration. Derivation:
+/// lib/msckf/MODEL.md.
+///
+/// Frame local: z up, x along the vehicle's heading at the start, origin at the imu there. vehicle: the imu's axes and
+/// origin (body of the calibration).
+/// Time: everything comes in the order of its stamps (add); advance() hands in imu samples and lets the state follow,
+/// behind them by the largest time offset that the calibration allows. output() is for the newest imu sample.
+/// Same inputs in the same order give the same bits. One thread; memory is bounded.
+#pragma once
+
+#include <deque>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "msckf/point_update.h"
+#include "msckf/propagation.h"
+#include "msckf/stamp_line.h"
+#include "msckf/standing.h"
+#include "msckf/vehicle_aiding.h"
+#include "samples/samples.h"
+
+namespace roadfix {
+
+enum class MsckfPhase { kStarting, kRunning, kLost };
+enum class MsckfScale { kUnknown, kInertial, kWheels };
+
+struct MsckfOutput {
+  Odometry odometry;
+  MsckfPhase phase = MsckfPhase::kStarting;
+  MsckfScale scale = MsckfScale::kUnknown;
+  bool standing = false;
+  std::string reason;  ///< plain words; empty when all is well
+  int reset_counter = 0;
+  int num_landmarks = 0;
+  int num_tracks = 0;       ///< in the newest picture
+  double used_share = 1.0;  ///< of the points tried lately, those that fitted
+};
+
+class Msckf {
+ public:
+  explicit Msckf(const MsckfConfig& config);
+
+  void add(const msckf::SeenFrame& frame);
+  void add(const WheelSample& wheels);
+  /// Speed over ground known from elsewhere (an INS), for a start in motion only.
+  void add_speed(int64_t t_us, double speed, double sigma);
+  /// The horizon has passed this sample. False where it is refused: not newer, or not finite.
+  bool advance(const ImuSample& imu);
+
+  /// Carried to `ahead`, newest samples that advance() has not seen yet, oldest first.
+  [[nodiscard]] MsckfOutput output(std::span<const ImuSample> ahead = {}) const;
+  /// Turn of the camera from one stamp to another by the gyro; nothing where the samples do not reach.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> camera_turn(int64_t before_us, int64_t now_us) const;
+  /// Nothing before the first start.
+  [[nodiscard]] const msckf::State* state() const { return phase_ == MsckfPhase::kRunning ? &state_ : nullptr; }
+  [[nodiscard]] const msckf::PointCounts& counts() const { return points_.counts(); }
+  [[nodiscard]] const MsckfConfig& config() const { return config_; }
+
+  void digest(Digest& digest) const;
+  /// Everything that later outputs depend on; load() throws std::runtime_error on bytes that are no such state.
+  [[nodiscard]] std::vector<uint8_t> save() const;
+  void load(std::span<const uint8_t> bytes);
+
+ private:
+  struct KnownSpeed {
+    int64_t t_us = 0;
+    double speed = 0.0, sigma = 0.0;
+  };
+
+  void follow(int64_t until_us);
+  void propagate(int64_t t_us);
+  void use(const msckf::SeenFrame& frame);
+  void use(const WheelSample& wheels);
+  void use_picture(const msckf::SeenFrame& frame);
+  void use_tracks(bool window_full);
+  void use_vehicle(const WheelSample* wheels);
+  bool try_linear(const msckf::Linear& linear);
+  [[nodiscard]] bool due(int64_t& next_us, double interval_s) const;
+  [[nodiscard]] double axle_speed(const WheelSample& wheels) const;
+  [[nodiscard]] int64_t picture_us(const msckf::SeenFrame& frame) const;
+
+  bool start_standing(int64_t t_us);
+  bool start_moving(int64_t t_us);
+  [[nodiscard]] std::optional<KnownSpeed> speed_for_start(int64_t t_us) const;
+  void begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen::Vector3d& v_imu, double v_std,
+                double tilt_std);
+  void judge(int64_t t_us);
+  void lose(const std::string& reason);
+
+  template <class Archive>
+  void serialise(Archive& a);
+
+  MsckfConfig config_;
+  int64_t lag_us_ = 0;
+  msckf::State state_;
+  msckf::Propagation propagation_;
+  msckf::PointUpdate points_;
+  msckf::Update update_;
+  msckf::TrackStore tracks_;
+  msckf::Standing standing_;
+  msckf::StampLine stamps_;
+  std::deque<ImuSample> imu_;  ///< from the sample that contains the state's epoch on
+  std::deque<msckf::SeenFrame> frames_;
+  std::deque<WheelSample> wheels_;
+  std::optional<KnownSpeed> known_speed_, wheel_speed_;
+
+  MsckfPhase phase_ = MsckfPhase::kStarting;
+  MsckfScale scale_ = MsckfScale::kUnknown;
+  std::string reason_;
+  bool stands_ = false;
+  int reset_counter_ = 0;
+  SE3 last_pose_;  ///< where a restart goes on
+  int64_t next_clone_ = 1;
+  int64_t clone_us_ = 0;  ///< of the newest clone
+  int64_t next_wheels_us_ = 0, next_sideslip_us_ = 0, next_planar_us_ = 0, next_zero_us_ = 0;
+  int64_t used_us_ = 0;      ///< last time that points or standing corrected the state
+  int64_t doubtful_us_ = 0;  ///< since when most points are refused; zero: they are not
+  double used_share_ = 1.0;
+  int num_seen_ = 0;
+};
+
+}  // namespace roadfix

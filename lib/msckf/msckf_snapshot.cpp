@@ -1,0 +1,143 @@
+// Snapshots: one list of members serves writing and reading.
+#include <stdexcept>
+
+#include "msckf/msckf.h"
+#include "stream/state_bytes.h"
+
+namespace roadfix {
+
+using namespace msckf;
+
+namespace {
+
+struct Writer {
+  static constexpr bool kReads = false;
+  StateWriter out;
+  template <class... T>
+  void operator()(const T&... values) {
+    (out.put(values), ...);
+  }
+};
+
+struct Reader {
+  static constexpr bool kReads = true;
+  StateReader in;
+  template <class... T>
+  void operator()(T&&... values) {
+    (in.get(values), ...);
+  }
+};
+
+/// The number of things, then each.
+template <class Archive, class List, class Each>
+void list(Archive& a, List& items, size_t most, const Each& each) {
+  auto count = static_cast<int64_t>(items.size());
+  a(count);
+  if (count < 0 || static_cast<size_t>(count) > most) throw std::runtime_error("state: impossible number of items");
+  if constexpr (Archive::kReads) items.resize(static_cast<size_t>(count));
+  for (auto& item : items) each(item);
+}
+
+template <class Archive, class T, class Each>
+void optional(Archive& a, std::optional<T>& value, const Each& each) {
+  bool present = value.has_value();
+  a(present);
+  if constexpr (Archive::kReads) {
+    value.reset();
+    if (present) value.emplace();
+  }
+  if (value) each(*value);
+}
+
+template <class Archive>
+void point(Archive& a, SeenPoint& p) {
+  a(p.track, p.left, p.px);
+  optional(a, p.right, [&](Eigen::Vector2d& right) { a(right); });
+}
+
+template <class Archive>
+void imu_sample(Archive& a, ImuSample& s) {
+  a(s.t_us, s.gyro, s.accel);
+}
+
+constexpr size_t kMost = 1'000'000;
+
+}  // namespace
+
+template <class Archive>
+void State::serialise(Archive& a) {
+  a(imu.t_us, imu.q.coeffs(), imu.v, imu.p, imu.gyro_bias, imu.accel_bias, imu.gyro_scale, imu.accel_scale);
+  a(camera.T_imu_camera.q.coeffs(), camera.T_imu_camera.p, camera.time_offset, camera.wheel_scale, camera.mounting);
+  list(a, clones, kMaxClones, [&](Clone& c) { a(c.id, c.at, c.R, c.p); });
+  list(a, landmarks, kMaxLandmarks, [&](Landmark& l) { a(l.track, l.anchor, l.at, l.f); });
+  a(size_);
+  const auto expected = static_cast<size_t>(kBaseSize) + 6 * clones.size() + 3 * landmarks.size();
+  if (size_ < 0 || static_cast<size_t>(size_) != expected) throw std::runtime_error("state: impossible size");
+  Eigen::MatrixXd P = P_.topLeftCorner(size_, size_);
+  a(P);
+  P_.topLeftCorner(size_, size_) = P;
+}
+
+template <class Archive>
+void TrackStore::serialise(Archive& a) {
+  list(a, tracks_, kMost, [&](Track& t) {
+    a(t.id, t.alive, t.count);
+    if (t.count < 0 || t.count > kMaxClones) throw std::runtime_error("state: impossible number of sightings");
+    for (int i = 0; i < t.count; ++i) {
+      Sighting& s = t.seen[static_cast<size_t>(i)];
+      a(s.clone);
+      point(a, s.point);
+    }
+  });
+}
+
+template <class Archive>
+void Standing::serialise(Archive& a) {
+  a(sums_, times_, block_.end_us, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander);
+  for (Picture* picture : {&older_, &newer_}) {
+    a(picture->t_us);
+    list(a, picture->places, kMost, [&](Place& p) { a(p.track, p.left); });
+  }
+  optional(a, flow_, [&](double& flow) { a(flow); });
+  a(frame_us_, wheels_us_, wheels_rest_);
+}
+
+template <class Archive>
+void Msckf::serialise(Archive& a) {
+  state_.serialise(a);
+  tracks_.serialise(a);
+  standing_.serialise(a);
+  list(a, imu_, kMost, [&](ImuSample& s) { imu_sample(a, s); });
+  list(a, frames_, kMost, [&](SeenFrame& f) {
+    a(f.t_us);
+    list(a, f.points, kMost, [&](SeenPoint& p) { point(a, p); });
+  });
+  list(a, wheels_, kMost, [&](WheelSample& w) {
+    a(w.t_us, w.direction, w.num_speeds);
+    for (double& speed : w.speeds) a(speed);
+    optional(a, w.yaw_rate, [&](double& rate) { a(rate); });
+  });
+  for (std::optional<KnownSpeed>* speed : {&known_speed_, &wheel_speed_})
+    optional(a, *speed, [&](KnownSpeed& s) { a(s.t_us, s.speed, s.sigma); });
+  int64_t stamp_us = stamps_.last_us();
+  a(phase_, scale_, reason_, stands_, reset_counter_, last_pose_.q.coeffs(), last_pose_.p, stamp_us, next_clone_,
+    clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_, used_us_, doubtful_us_, used_share_,
+    num_seen_);
+}
+
+std::vector<uint8_t> Msckf::save() const {
+  Writer writer;
+  // The writer only reads: serialise() is one list for both directions and so cannot be const.
+  const_cast<Msckf*>(this)->serialise(writer);
+  return writer.out.take();
+}
+
+void Msckf::load(std::span<const uint8_t> bytes) {
+  Msckf fresh(config_);
+  Reader reader{StateReader(bytes)};
+  fresh.serialise(reader);
+  reader.in.finish();
+  *this = std::move(fresh);
+}
+
+}  // namespace roadfix

@@ -1,0 +1,212 @@
+// Starts, loss and restart, (M.30)-(M.33).
+#include <cmath>
+
+#include "geometry/euler.h"
+#include "geometry/so3.h"
+#include "msckf/msckf.h"
+
+namespace roadfix {
+
+using namespace msckf;
+
+namespace {
+
+constexpr double kStandingSpeedStd = 0.02;  // m/s
+constexpr double kEarthRate = 7.3e-5;       // rad/s: what standing cannot tell from a bias
+constexpr double kLevellingStd = 2e-3;      // rad, besides the accelerometer's bias
+constexpr double kGaugeStd = 1e-4;          // m and rad: where the frame begins is a convention
+constexpr double kSpeedAge_s = 0.5;
+constexpr double kTurnRate = 0.1;   // rad/s, least that tells a speed
+constexpr double kTurnSpeed = 2.0;  // m/s
+
+using BaseMatrix = Eigen::Matrix<double, kBaseSize, kBaseSize>;
+
+}  // namespace
+
+bool Msckf::start_standing(int64_t t_us) {
+  if (!standing_.stands(t_us, std::nullopt)) {
+    return false;
+  }
+  const ImuBlock& block = standing_.block();
+  begin_at(t_us, block.accel.normalized(), Eigen::Vector3d::Zero(), kStandingSpeedStd, kLevellingStd);
+  // The gyro's mean is its bias.
+  state_.imu.gyro_bias = block.gyro;
+  Eigen::MatrixXd& P = state_.P();
+  const double variance =
+      config_.vehicle.gyro_noise * config_.vehicle.gyro_noise / config_.trust.block_s + kEarthRate * kEarthRate;
+  P.block<3, 3>(kGyroBias, kGyroBias) = variance * Eigen::Matrix3d::Identity();
+  scale_ = MsckfScale::kInertial;
+  stands_ = true;
+  return true;
+}
+
+std::optional<Msckf::KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
+  for (const std::optional<KnownSpeed>& s : {wheel_speed_, known_speed_})
+    if (s && std::abs(seconds_between(s->t_us, t_us)) < kSpeedAge_s) return s;
+  // A turn tells it: lateral acceleration over yaw rate, as far as the road is level, (M.33).
+  const ImuBlock& block = standing_.block();
+  const double rate = block.gyro.z();
+  if (std::abs(rate) < kTurnRate || block.gyro_wander > 0.5 * std::abs(rate)) return std::nullopt;
+  const double speed = block.accel.y() / rate;
+  const double tilt = std::hypot(config_.aiding.planar_slack, config_.vehicle.mounting_std);
+  const double sigma = std::hypot(config_.vehicle.gravity * tilt, config_.vehicle.accel_bias_std) / std::abs(rate);
+  if (speed < kTurnSpeed || speed > config_.trust.max_speed || sigma > 0.5 * speed) return std::nullopt;
+  return KnownSpeed{t_us, speed, sigma};
+}
+
+bool Msckf::start_moving(int64_t t_us) {
+  const ImuBlock& block = standing_.block();
+  if (block.end_us == 0 || seconds_between(block.end_us, t_us) > 2.1 * config_.trust.block_s) return false;
+  const std::optional<KnownSpeed> known = speed_for_start(t_us);
+  if (!known) {
+    reason_ = "moving; the scale is not yet known";
+    return false;
+  }
+  // What the mean specific force has besides gravity: the turn's lateral acceleration; the rest is doubt.
+  const Eigen::Vector3d turning(0.0, known->speed * block.gyro.z(), 0.0);
+  const double doubt = 0.1 + block.accel_wander / config_.vehicle.gravity;
+  const Eigen::Vector3d forward = state_.camera.R_imu_vehicle().col(0);
+  begin_at(t_us, (block.accel - turning).normalized(), known->speed * forward, known->sigma + 0.1, doubt);
+  const Eigen::Matrix3d R = state_.imu.R();
+  const double side = 0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed);  // m/s
+  const Eigen::Vector3d std(known->sigma + 0.1, side, side);
+  const Eigen::Matrix3d V = skew(state_.imu.v);
+  Eigen::MatrixXd& P = state_.P();
+  P.block<3, 3>(kVel, kVel) =
+      R * std.cwiseAbs2().asDiagonal() * R.transpose() + V * P.block<3, 3>(kAtt, kAtt) * V.transpose();
+  scale_ = known->t_us == t_us ? MsckfScale::kInertial : MsckfScale::kWheels;
+  return true;
+}
+
+void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen::Vector3d& v_imu, double v_std,
+                     double tilt_std) {
+  const MsckfVehicle& c = config_.vehicle;
+  ImuState& imu = state_.imu;
+  imu = {};
+  imu.t_us = t_us;
+  // Level, then turned to the heading at which the pose stood before (zero at first).
+  const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(up_in_imu, Eigen::Vector3d::UnitZ());
+  imu.q = (exp_q({0.0, 0.0, yaw_of(last_pose_.q) - yaw_of(level)}) * level).normalized();
+  imu.p = last_pose_.p;
+  imu.v = imu.q * v_imu;
+
+  BaseMatrix P = BaseMatrix::Zero();
+  const auto set = [&](int at, int width, double std) { P.diagonal().segment(at, width).setConstant(std * std); };
+  set(kAtt, 2, tilt_std);
+  set(kAtt + 2, 1, kGaugeStd);
+  set(kVel, 3, v_std);
+  set(kPos, 3, kGaugeStd);
+  set(kGyroBias, 3, c.gyro_bias_std);
+  set(kAccelBias, 3, c.accel_bias_std);
+  set(kGyroScale, 3, c.scale_std);
+  set(kAccelScale, 3, c.scale_std);
+  set(kCameraTurn, 3, c.camera_turn_std);
+  set(kCameraPlace, 3, c.camera_std);
+  set(kTimeOffset, 1, c.time_offset_std);
+  set(kWheelScale, 1, c.wheel_scale_std);
+  set(kMounting, 2, c.mounting_std);
+  // Levelling by a biased accelerometer: phi = (-b_y, b_x, 0) / g in local axes, (M.31).
+  Eigen::Matrix<double, 3, 3> tilt = Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d R = imu.R();
+  tilt.row(0) = -R.row(1) / c.gravity;
+  tilt.row(1) = R.row(0) / c.gravity;
+  const double bias = c.accel_bias_std * c.accel_bias_std;
+  P.block<3, 3>(kAtt, kAtt) += bias * tilt * tilt.transpose();
+  P.block<3, 3>(kAtt, kAccelBias) = bias * tilt;
+  P.block<3, 3>(kAccelBias, kAtt) = P.block<3, 3>(kAtt, kAccelBias).transpose();
+  // phi moves velocity and position with it, (M.1): what is known is the plain error.
+  Eigen::Matrix<double, 9, 9> J = Eigen::Matrix<double, 9, 9>::Identity();
+  J.block<3, 3>(kVel, kAtt) = skew(imu.v);
+  J.block<3, 3>(kPos, kAtt) = skew(imu.p);
+  P.topRows<9>() = (J * P.topRows<9>()).eval();
+  P.leftCols<9>() = (P.leftCols<9>() * J.transpose()).eval();
+  P = (0.5 * (P + P.transpose())).eval();
+  state_.reset(P);
+  tracks_.clear();
+  propagation_.clear();
+  phase_ = MsckfPhase::kRunning;
+  reason_.clear();
+  used_us_ = t_us;
+  doubtful_us_ = 0;
+  used_share_ = 1.0;
+  clone_us_ = 0;
+  next_wheels_us_ = next_sideslip_us_ = next_planar_us_ = next_zero_us_ = 0;
+}
+
+void Msckf::judge(int64_t t_us) {
+  if (phase_ != MsckfPhase::kRunning) return;
+  const ImuState& x = state_.imu;
+  const MsckfTrust& trust = config_.trust;
+  const auto too_large = [&](const Eigen::Vector3d& bias, double std) {
+    return bias.cwiseAbs().maxCoeff() > trust.max_bias_sigmas * std + 0.0;
+  };
+  if (!x.p.allFinite() || !x.v.allFinite() || !state_.P().diagonal().head(state_.size()).allFinite())
+    return lose("the filter broke");
+  if (x.v.norm() > trust.max_speed) return lose("the speed is impossible");
+  if (too_large(x.accel_bias, config_.vehicle.accel_bias_std)) return lose("the accelerometer bias is impossible");
+  if (doubtful_us_ != 0 && seconds_between(doubtful_us_, t_us) > trust.lost_after_s)
+    return lose("most points do not fit");
+  reason_.clear();
+  if (seconds_between(used_us_, t_us) > trust.coasting_after_s) reason_ = "no points to follow";
+  last_pose_ = {x.q, x.p};
+}
+
+void Msckf::lose(const std::string& reason) {
+  phase_ = MsckfPhase::kLost;
+  scale_ = MsckfScale::kUnknown;
+  reason_ = reason;
+  stands_ = false;
+  ++reset_counter_;
+}
+
+MsckfOutput Msckf::output(std::span<const ImuSample> ahead) const {
+  MsckfOutput out;
+  out.phase = phase_;
+  out.scale = scale_;
+  out.standing = stands_;
+  out.reason = reason_;
+  out.reset_counter = reset_counter_;
+  out.num_landmarks = static_cast<int>(state_.landmarks.size());
+  out.num_tracks = num_seen_;
+  out.used_share = used_share_;
+  const int64_t newest = !ahead.empty() ? ahead.back().t_us : imu_.empty() ? 0 : imu_.back().t_us;
+  out.odometry.t_us = newest;
+  if (phase_ != MsckfPhase::kRunning) return out;
+
+  ImuState x = state_.imu;
+  Propagation carried(config_.vehicle);
+  Eigen::Vector3d gyro = imu_.back().gyro;
+  const auto carry = [&](const ImuSample& s) {
+    if (s.t_us <= x.t_us) return;
+    gyro = s.gyro;
+    carried.step(x, s.gyro, s.accel, seconds_between(x.t_us, s.t_us));
+    x.t_us = s.t_us;
+  };
+  for (const ImuSample& s : imu_) carry(s);
+  for (const ImuSample& s : ahead) carry(s);
+  const Eigen::Matrix<double, 9, kImuSize> F = carried.transition();
+  Eigen::Matrix<double, 9, 9> P = F * state_.P().topLeftCorner<kImuSize, kImuSize>() * F.transpose() + carried.noise();
+  const Eigen::Matrix3d R = x.R();
+  Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
+  J.block<3, 3>(0, kAtt) = -skew(x.p);
+  J.block<3, 3>(0, kPos).setIdentity();
+  J.block<3, 3>(3, kAtt) = R.transpose();
+  Odometry& o = out.odometry;
+  o.T_frame_vehicle = {normalized_positive(x.q), x.p};
+  o.velocity = R.transpose() * x.v;
+  o.angular_rate = x.rate(gyro);
+  o.cov_pose = J * P * J.transpose();
+  o.cov_pose = (0.5 * (o.cov_pose + o.cov_pose.transpose())).eval();
+  o.cov_velocity = R.transpose() * P.block<3, 3>(kVel, kVel) * R;
+  o.cov_velocity = (0.5 * (o.cov_velocity + o.cov_velocity.transpose())).eval();
+  const double velocity_std = std::sqrt(o.cov_velocity.diagonal().maxCoeff());
+  o.validity = velocity_std > config_.trust.invalid_sigma_mps ? Validity::kInvalid
+               : reason_.empty()                              ? Validity::kValid
+                                                              : Validity::kCoasting;
+  if (o.validity == Validity::kInvalid) out.reason = "velocity not known well enough";
+  return out;
+}
+
+void Msckf::digest(Digest& digest) const { state_.digest(digest); }
+
+}  // namespace roadfix

@@ -1,0 +1,116 @@
+#include "msckf/sighting.h"
+
+#include <cmath>
+
+#include "geometry/so3.h"
+
+namespace roadfix::msckf {
+
+namespace {
+
+constexpr int kRounds = 5;
+constexpr double kLeastDistanceAhead = 0.05;  // of h.z, whose size is about one
+
+/// One sighting's eye, prepared for the iterations.
+struct Eye {
+  RelativeView view;
+  Eigen::Vector2d z;
+  double px;
+};
+
+struct Eyes {
+  std::array<Eye, 2 * kMaxClones> list;
+  int count = 0;
+  void add(const RelativeView& view, const Eigen::Vector2d& z, double px) {
+    list[static_cast<size_t>(count++)] = {view, z, px};
+  }
+  [[nodiscard]] std::span<const Eye> all() const { return {list.data(), static_cast<size_t>(count)}; }
+};
+
+/// Inverse depth along the ray (alpha, beta, 1) that fits the sightings best, weighed as if all were equally far.
+double guess_inverse_depth(const Eyes& eyes, const Eigen::Vector2d& ray) {
+  double ab = 0.0, bb = 0.0;
+  for (const Eye& eye : eyes.all()) {
+    const Eigen::Vector3d m = eye.view.B * Eigen::Vector3d(ray.x(), ray.y(), 1.0);
+    const Eigen::Vector2d a = m.head<2>() - eye.z * m.z();
+    const Eigen::Vector2d b = eye.view.c.head<2>() - eye.z * eye.view.c.z();
+    ab += a.dot(b);
+    bb += b.squaredNorm();
+  }
+  return bb > 0.0 ? -ab / bb : 0.0;
+}
+
+}  // namespace
+
+RelativeView left_view(const Calibrated& camera, const Clone& anchor, const Clone& clone) {
+  const Eigen::Matrix3d C = camera.T_imu_camera.R();
+  const Eigen::Vector3d& t = camera.T_imu_camera.p;
+  const Eigen::Matrix3d A = C.transpose() * clone.R.transpose();
+  return {A * anchor.R * C, A * (anchor.R * t + anchor.p - clone.p) - C.transpose() * t};
+}
+
+RelativeView right_view(const RelativeView& left, const SE3& T_left_right) {
+  const Eigen::Matrix3d A = T_left_right.R().transpose();
+  return {A * left.B, A * (left.c - T_left_right.p)};
+}
+
+DirectionJacobian direction_jacobian(const Calibrated& camera, const Clone& anchor, const Clone& clone,
+                                     const RelativeView& left, const Eigen::Vector3d& f) {
+  const Eigen::Matrix3d C = camera.T_imu_camera.R();
+  const Eigen::Vector3d& t = camera.T_imu_camera.p;
+  const Eigen::Matrix3d A = C.transpose() * clone.R.transpose();
+  const Eigen::Vector3d m(f.x(), f.y(), 1.0);
+  const Eigen::Vector3d u = anchor.R * (C * m + f.z() * t) + f.z() * anchor.p;
+  DirectionJacobian J;
+  J.anchor_turn = -A * skew(u);
+  J.anchor_place = f.z() * A;
+  J.camera_turn = skew(left.direction(f)) - left.B * skew(m);
+  J.camera_place = f.z() * (A * anchor.R - C.transpose());
+  return J;
+}
+
+Matrix2x3 projection_jacobian(const Eigen::Vector3d& h) {
+  const double w = 1.0 / h.z();
+  Matrix2x3 J;
+  J << w, 0.0, -h.x() * w * w, 0.0, w, -h.y() * w * w;
+  return J;
+}
+
+std::optional<Eigen::Vector3d> triangulate(const State& state, std::span<const Sighting> sightings, const Clone& anchor,
+                                           const std::optional<SE3>& T_left_right, double sigma_px, double nearest) {
+  Eyes eyes;
+  Eigen::Vector2d ray = sightings.front().point.left;
+  for (const Sighting& s : sightings) {
+    const RelativeView left = left_view(state.camera, anchor, state.clone(s.clone));
+    eyes.add(left, s.point.left, s.point.px);
+    if (s.clone == anchor.id) ray = s.point.left;
+    if (T_left_right && s.point.right) eyes.add(right_view(left, *T_left_right), *s.point.right, s.point.px);
+  }
+  Eigen::Vector3d f(ray.x(), ray.y(), guess_inverse_depth(eyes, ray));
+  f.z() = std::max(f.z(), 0.0);
+  Eigen::Matrix3d information;
+  for (int round = 0; round < kRounds; ++round) {
+    information.setZero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    for (const Eye& eye : eyes.all()) {
+      const Eigen::Vector3d h = eye.view.direction(f);
+      if (h.z() < kLeastDistanceAhead) return std::nullopt;
+      const double weight = eye.px / sigma_px;
+      const Matrix2x3 J = weight * projection_jacobian(h) * eye.view.by_point();
+      information += J.transpose() * J;
+      gradient += J.transpose() * (weight * (eye.z - h.head<2>() / h.z()));
+    }
+    information.diagonal().array() += 1e-9;  // no parallax at all: the distance stays
+    const Eigen::Vector3d d = information.llt().solve(gradient);
+    f += d;
+    if (std::abs(d.z()) < 1e-6 && d.head<2>().norm() < 1e-6) break;
+  }
+  if (!f.allFinite() || f.z() > 1.0 / nearest) return std::nullopt;
+  for (const Eye& eye : eyes.all())
+    if (eye.view.direction(f).z() < kLeastDistanceAhead) return std::nullopt;
+  const double sigma = std::sqrt(information.inverse()(2, 2));
+  if (f.z() < -3.0 * sigma) return std::nullopt;  // behind infinity by more than noise explains
+  return f;
+}
+
+}  // namespace roadfix::msckf

@@ -1,0 +1,36 @@
+/// Puts late stamps right. A camera with its own clock takes pictures evenly; what delays a stamp is the computer, so
+/// it comes late and never early, (M.34).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace roadfix::msckf {
+
+class StampLine {
+ public:
+  /// A rate or jitter of zero leaves stamps as they are.
+  StampLine(double rate_hz, double jitter_s) : period_us_(rate_hz > 0.0 && jitter_s > 0.0 ? 1e6 / rate_hz : 0.0) {}
+
+  /// The moment of the next picture, by its stamp.
+  int64_t on_time(int64_t stamp_us) {
+    const auto waited = static_cast<double>(stamp_us - last_us_);
+    const double steps = period_us_ > 0.0 ? std::max(1.0, std::round(waited / period_us_)) : 0.0;
+    if (last_us_ == 0 || period_us_ <= 0.0 || steps > kLostSteps) return last_us_ = stamp_us;
+    const double late_us = waited - steps * period_us_;
+    last_us_ += std::llround(steps * period_us_ + (late_us < 0.0 ? late_us : kGain * late_us));
+    return last_us_;
+  }
+  [[nodiscard]] int64_t last_us() const { return last_us_; }
+  void set_last(int64_t last_us) { last_us_ = last_us; }
+
+ private:
+  static constexpr double kGain = 0.02;       ///< of a late stamp; follows clocks that drift by 1e-3
+  static constexpr double kLostSteps = 20.0;  ///< pictures lost before the line begins anew
+
+  double period_us_;
+  int64_t last_us_ = 0;
+};
+
+}  // namespace roadfix::msckf

@@ -1,0 +1,60 @@
+/// Does the vehicle stand? Quiet imu, still picture, still wheels: what is there must agree.
+#pragma once
+
+#include "msckf/config.h"
+#include "msckf/tracks.h"
+#include "samples/samples.h"
+
+namespace roadfix::msckf {
+
+/// Means over the last complete block of imu samples.
+struct ImuBlock {
+  int64_t end_us = 0;
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  double gyro_wander = 1e9;  ///< rad/s, largest distance of a quarter's mean from the block's
+  double accel_wander = 1e9;
+};
+
+class Standing {
+ public:
+  explicit Standing(const MsckfTrust& trust) : trust_(trust) {}
+
+  void add(const ImuSample& imu, double dt);
+  void add(const SeenFrame& frame);
+  void add_speed(int64_t t_us, double speed);
+
+  /// Imu quiet, picture still, wheels (if they spoke within a second) at rest. Without a picture, the imu and wheels
+  /// must say it, or the filter itself, by `speed`.
+  [[nodiscard]] bool stands(int64_t t_us, std::optional<double> speed) const;
+  [[nodiscard]] const ImuBlock& block() const { return block_; }
+  /// Median motion of the tracks over the last half to whole second, px; nothing without enough of them.
+  [[nodiscard]] const std::optional<double>& flow() const { return flow_; }
+
+  template <class Archive>
+  void serialise(Archive& a);
+
+ private:
+  static constexpr int kQuarters = 4;
+  struct Place {
+    int64_t track = 0;
+    Eigen::Vector2d left = Eigen::Vector2d::Zero();
+  };
+  struct Picture {
+    int64_t t_us = 0;
+    std::vector<Place> places;
+  };
+
+  MsckfTrust trust_;
+  Eigen::Matrix<double, 6, kQuarters> sums_ = Eigen::Matrix<double, 6, kQuarters>::Zero();
+  Eigen::Vector4d times_ = Eigen::Vector4d::Zero();
+  ImuBlock block_;
+  Picture older_, newer_;
+  std::optional<double> flow_;
+  int64_t frame_us_ = 0;
+  int64_t wheels_us_ = 0;
+  bool wheels_rest_ = false;
+  std::vector<double> moved_;  ///< scratch
+};
+
+}  // namespace roadfix::msckf
