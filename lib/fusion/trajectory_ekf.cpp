@@ -33,7 +33,9 @@ void MotionTrajectoryEkf::add(double dt, const Eigen::Vector2d& measured) {
   const Eigen::Matrix<double, 5, 2> K = P_.leftCols<2>() * S.inverse();
   x_ += K * (measured - x_.head<2>());
   x_(2) = wrap_angle(x_(2));
-  P_ -= K * S * K.transpose();
+  Matrix5d I_KH = Matrix5d::Identity();  // Joseph's form: with course and turn unknown the short one loses its sign
+  I_KH.leftCols<2>() -= K;
+  P_ = I_KH * P_ * I_KH.transpose() + variance * K * K.transpose();
 }
 
 /// Two positions give course and speed.
