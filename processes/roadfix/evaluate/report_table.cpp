@@ -138,12 +138,35 @@ std::string overview(const EvaluationReport& report) {
   return text;
 }
 
+std::string aligned_mean(const ChannelReport& c, Alignment alignment) {
+  for (const AlignedAte& a : c.ate_by_alignment)
+    if (a.alignment == alignment) return number(a.mean);
+  return "-";
+}
+
+/// Tables 1 and 2 of paper C for this drive. Its VIO was aligned to the reference by a similarity before it was scored;
+/// a car has no reference, so that what was published stands first, and the paper's way beside it by its name.
+std::string paper_tables(const EvaluationReport& report) {
+  std::string text = fmt::format("\n{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", "paper C", "ATE mean m",
+                                 "ATE sim3 m", "RPE m", "TSE m", "RCT s", "MPA %", "balanced %", "always CA %");
+  for (const ChannelReport& c : report.channels) {
+    const auto share = [](double value) { return fmt::format("{:.1f}", value); };
+    const std::string published = c.alignment == Alignment::kNone && c.pairs > 0 ? number(c.ate_mean) : "-";
+    text += fmt::format("{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", c.channel, published,
+                        aligned_mean(c, Alignment::kSim3), c.rpe_mean ? number(*c.rpe_mean) : "-",
+                        c.tse_m ? number(*c.tse_m) : "-", c.rct ? number(c.rct->mean_s) : "-",
+                        c.modes ? share(c.modes->percent) : "-", c.modes ? share(c.modes->balanced_percent) : "-",
+                        c.modes ? share(c.modes->always_straight_percent) : "-");
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string report_table(const EvaluationReport& report) {
   std::string text = head(report);
   for (const ChannelReport& c : report.channels) text += channel_text(c);
-  return text + overview(report);
+  return text + paper_tables(report) + "\n" + overview(report);
 }
 
 std::string errors_csv(const ChannelReport& channel) {
