@@ -17,7 +17,8 @@ constexpr double kUnknownRate = 0.1;            ///< rad/s per sqrt(Hz): a stree
 constexpr double kPlainDisturbance = 3.0;       ///< m/s2 per sqrt(Hz): 1.5 m/s2 over 2 s, uncorrected driving
 constexpr double kPlainLevelling = 0.05;        ///< s of force per levelling without wheels
 constexpr double kBiasBlock = 1.0;              ///< s of standing gyro mean per bias update
-constexpr double kBiasGate = 10.8;              ///< squared sigma, 99.9 %: more than a bias can be is turning
+constexpr double kFirstBiasGate = 6.6;  ///< squared sigma, 99 %, of a standstill's first mean: beyond is turning
+constexpr double kBiasGate = 25.0;      ///< of the later ones, of which there may be hundreds
 
 bool usable(const ImuSample& imu) {
   return imu.gyro.cwiseAbs().maxCoeff() < kLargestRate && imu.accel.cwiseAbs().maxCoeff() < kLargestForce &&
@@ -206,13 +207,14 @@ void WheelOdometry::learn_bias(const WheelStep& standing_step) {
   const Eigen::Vector3d difference = block_gyro_ / block_time_ - state_.x.segment<3>(kGyroBias);
   for (int i = 0; i < 3; ++i) {
     const double d = difference(i), S = state_.P(kGyroBias + i, kGyroBias + i) + variance;
-    const bool no_bias = d * d > kBiasGate * S;
+    const bool no_bias = d * d > (bias_judged_ ? kBiasGate : kFirstBiasGate) * S;
     if (i == 2 && no_bias) turns_standing_ = true;
     if (no_bias || (i == 2 && turns_standing_)) continue;
     WheelVector H = WheelVector::Zero();
     H(kGyroBias + i) = 1.0;
     schmidt_update(state_, H, d, variance, {kGyroBias + i});
   }
+  bias_judged_ = true;
   block_gyro_.setZero();
   block_time_ = 0.0;
 }

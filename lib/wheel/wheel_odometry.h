@@ -115,6 +115,7 @@ class WheelOdometry {
   std::optional<int64_t> slip_since_us_;
   StandingState standing_;
   bool turns_standing_ = false;  ///< the wheels stand, the gyro says more than its bias can be
+  bool bias_judged_ = false;     ///< by the first mean of this standstill
   DirectionState direction_;
   Eigen::Vector3d plumb_force_ = Eigen::Vector3d::Zero();  ///< m/s, specific force integrated since the last levelling
   Eigen::Vector3d plumb_gyro_ = Eigen::Vector3d::Zero();   ///< rad, likewise

@@ -107,7 +107,7 @@ void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
   visit(self.last_speed_, self.forward_acceleration_, self.wheel_yaw_rate_, self.gyro_);
   visit(self.gyro_yaw_, self.yaw_known_, self.slip_since_us_);
   visit(self.standing_.quiet_since_us, self.standing_.slow_gyro, self.standing_.quiet_gyro, self.standing_.standing,
-        self.turns_standing_);
+        self.turns_standing_, self.bias_judged_);
   visit(self.direction_.sign, self.direction_.assumed, self.direction_.undecided_since_us);
   visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_);
   visit(self.align_force_, self.align_time_, self.block_gyro_, self.block_time_);

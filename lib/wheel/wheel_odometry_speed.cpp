@@ -137,7 +137,7 @@ void WheelOdometry::watch_standing(int64_t t_us, double speed, bool trusted) {
     direction_ = DirectionState{};
     block_gyro_.setZero();
     block_time_ = 0.0;
-    turns_standing_ = false;
+    turns_standing_ = bias_judged_ = false;
   }
   if (stood && !standing_.standing) {
     decouple(state_.P, kSpeed, t.standing_speed);
