@@ -160,6 +160,7 @@ class Fusion {
   void fuse_rates(const ChannelSample& sample, const LevelView& view);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
                        ChannelReport& report);
+  [[nodiscard]] bool vision_speaks() const;
   void apply_gain(const Measurement<3>& gain);
   void distrust_velocity(const Planar& difference);
   void give_way(const Planar& difference);

@@ -65,7 +65,7 @@ FusionReport Fusion::report() const {
     return r;
   }
   const bool ins = alive(FusionChannel::kIns);
-  const bool vision = alive(FusionChannel::kVo) && memory(FusionChannel::kVo).last && agreement_.agrees;
+  const bool vision = vision_speaks();
   const bool wheel = alive(FusionChannel::kWheel);
   const double sigma = std::sqrt(now_.P.block<2, 2>(kPos, kPos).trace());
   r.phase = FusionPhase::kRunning;

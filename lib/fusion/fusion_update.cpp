@@ -173,6 +173,10 @@ void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view) {
   });
 }
 
+bool Fusion::vision_speaks() const {
+  return alive(FusionChannel::kVo) && memory(FusionChannel::kVo).last && agreement_.agrees;
+}
+
 FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, const PlanarEstimate& known,
                              ChannelReport& report) {
   gain_height(s.odometry);
@@ -183,7 +187,12 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
   const Measurement<3> plain = absolute_pose(now_.x, view.pose, view.P);
   tell(judge<3>(now_, plain.H, plain.innovation, plain.R), plain.innovation, report);
   FuseStatus status = FuseStatus::kAccepted;
-  if (report.nis > config_.gate) {
+  if (report.nis > config_.gate && !vision_speaks()) {
+    // All that it contradicts came from the INS itself, which knows it, and has judged the fix.
+    give_way(plain.innovation);
+    gain = gained_pose(planar_estimate(now_), view.pose, view.P, config_.least_gain);
+    status = FuseStatus::kReset;
+  } else if (report.nis > config_.gate) {
     refuse_fix(comeback_);
     distrust_velocity(plain.innovation);
     passes_needed_ = config_.comeback.fixes;
@@ -210,9 +219,10 @@ void Fusion::apply_gain(const Measurement<3>& gain) {
   });
   now_ = combine(imm_);
   const Planar correction = difference(now_.x, before.x).segment<3>(kPos);
+  const bool fix = gnss_ && ins_corrected_;
   const bool same_fix = last_fix_us_ && seconds_between(*last_fix_us_, t_us_) < kFixSpacing;
-  take_fix(comeback_, config_.comeback, correction, gnss_ && ins_corrected_ && !same_fix);
-  last_fix_us_ = t_us_;
+  take_fix(comeback_, config_.comeback, correction, fix && !same_fix);
+  if (fix) last_fix_us_ = t_us_;
 }
 
 /// An INS that was taken to a wrong place may have got a wrong speed with it; and may pass by the right place on its

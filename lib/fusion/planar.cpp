@@ -1,5 +1,6 @@
 #include "fusion/planar.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/euler.h"
@@ -124,8 +125,10 @@ double height_growth(double way, double dt) {
 
 FeltMotion motion_by_velocity(const LevelView& a, const LevelView& b) {
   const double dt = seconds_between(a.t_us, b.t_us);
-  const double turn = 0.5 * (a.turn + b.turn) * dt;
-  // b's axes are turned by what the rates say, not by b's corrected attitude.
+  // The attitudes tell the turn as far as it lies between the rates: these may be means over an interval, and the
+  // trapezium's error adds up. Beyond, b's attitude has been corrected.
+  const double middle = 0.5 * (a.turn + b.turn) * dt, slack = 0.5 * std::abs(b.turn - a.turn) * dt;
+  const double turn = std::clamp(wrap_angle(b.pose.z() - a.pose.z()), middle - slack, middle + slack);
   const Eigen::Vector2d d = 0.5 * dt * (a.velocity.head<2>() + rotation(turn) * b.velocity.head<2>());
   return {{d.x(), d.y(), turn}, 0.5 * dt * (a.velocity.z() + b.velocity.z())};
 }

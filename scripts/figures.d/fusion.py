@@ -1,5 +1,6 @@
 """fusion: POSE_FUSED through outages, against the truth of simulated drives and of adis_semisim."""
 import csv
+import math
 import statistics
 
 from support import Skipped, root_mean_square
@@ -9,6 +10,8 @@ BLIND = "wheel_odometry,gnss_ins_ekf,imm_fusion"  # wheels and IMU alone
 SEEING = "wheel_odometry,gnss_ins_ekf,vo_tracker,imm_fusion"
 SEEDS = range(1, 21)
 LEAST_AVAILABILITY = 0.99
+THIRD_FIX_US = 400_000  # after the first one, at 5 Hz
+SETTLED_M = 0.3
 
 
 def usable(figures):
@@ -41,6 +44,21 @@ def dark_end_pct(runs):
 def transition_ratio(runs):
     """Largest error within 5 s of loss or return over the error at the outage's end; median of the seeds."""
     return statistics.median(o["transition_peak_m"] / o["horizontal_m"] for o in outages(runs))
+
+
+def return_settle_s(runs):
+    """From the third good fix after an outage until the horizontal error is below 0.3 m; worst is never: 20 seeds' median."""
+    times = []
+    for seed in SEEDS:
+        for outage in dark(runs, seed)["outages"]["each"]:
+            third = outage["return_us"] + THIRD_FIX_US
+            path = runs.folder("tunnel_dark", seed) / "report" / f"{CHANNEL}_errors.csv"
+            with open(path, newline="") as file:
+                rows = [row for row in csv.DictReader(file) if int(row["utime_us"]) >= third]
+            near = (row for row in rows if math.hypot(float(row["longitudinal_m"]), float(row["lateral_m"])) < SETTLED_M)
+            settled = next(near, None)
+            times.append((int(settled["utime_us"]) - third) * 1e-6 if settled else math.inf)
+    return statistics.median(times)
 
 
 def nees(runs):
@@ -96,10 +114,12 @@ def malaga_20s_m(runs):
 MEASUREMENTS = {
     "dark_end_pct": dark_end_pct,
     "transition_ratio": transition_ratio,
+    "return_settle_s": return_settle_s,
     "ate_vs_best": ate_vs_best,
     "mpa_balanced_pct": mpa_balanced_pct,
     "nees": nees,
     "within_3sigma": within_3sigma,
     "adis_wheels_60s_m": adis_wheels_60s_m,
     "malaga_20s_m": malaga_20s_m,
+    "step_us": lambda runs: runs.benchmark("fusion_bench", "cpu_per_step_s") * 1e6,
 }

@@ -231,6 +231,28 @@ TEST_CASE("fixes 15 m off after the tunnel are refused, and it is said") {
   CHECK(planar_error(t.drive, fusion.fused()).distance() < 1.0);
 }
 
+TEST_CASE("without vision nobody can contradict the INS: the fusion gives way at once and makes it up evenly") {
+  Tunnel t;
+  t.ins.velocity_walk = 0.08;
+  t.ins.claimed = 0.2;  // far off after the tunnel, and sure of it
+  const auto events = ins_stream(t.drive, t.ins, 1);
+  Fusion fusion({});
+  double ins_before = 0.0, fused_later = 0.0, speed = 0.0;
+  bool gave_way = false;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    if (s < 100.0) ins_before = planar_error(t.drive, e.sample.odometry).distance();
+    gave_way = gave_way || f.channel(FusionChannel::kIns).status == FuseStatus::kReset;
+    if (s > 104.0) fused_later = std::max(fused_later, planar_error(t.drive, f.fused()).distance());
+    const double true_speed = t.drive.truth_at(e.sample.odometry.t_us).velocity.x();
+    if (s > 102.0) speed = std::max(speed, std::abs(f.fused().velocity.x() - true_speed));
+  });
+  CHECK(ins_before > 5.0);
+  CHECK(gave_way);
+  CHECK(fused_later < 0.5);
+  CHECK(speed < 0.5);
+}
+
 TEST_CASE("GNSS/INS killed and started again: vision and wheels carry on") {
   Tunnel t;
   t.ins.outages.clear();
