@@ -47,7 +47,7 @@ int KeyframeTracker::count_landmarks(const std::vector<KeyframeFeature>& feature
 }
 
 void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Feature>& features) {
-  start_.emplace();
+  start_ = Start{};
   start_->t_us = frame.t_us;
   std::vector<Feature> all = features;
   for (const Feature& f : front_end_->replenish()) all.push_back(f);

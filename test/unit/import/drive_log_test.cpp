@@ -2,6 +2,7 @@
 #include "roadfix/import/drive_log.h"
 
 #include <catch2/catch.hpp>
+#include <map>
 #include <roadfix/config_t.hpp>
 #include <set>
 
