@@ -6,7 +6,7 @@
 namespace roadfix {
 namespace {
 
-constexpr const char* kSensorNames[] = {"imu", "gnss", "wheels", "mag"};
+constexpr const char* kSensorNames[] = {"imu", "gnss", "wheels", "mag", "camera"};
 
 struct CommonFault {
   FaultKind kind;
@@ -104,8 +104,28 @@ std::vector<FaultType> all_faults() {
        "mag.disturb",
        "adds a field in vehicle axes",
        {{"x_ut", 10.0, -1000, 1000}, {"y_ut", 10.0, -1000, 1000}, {"z_ut", 0.0, -1000, 1000}}},
+      {Sensor::kCamera, FaultKind::kDark, "camera.dark", "light times factor", {{"factor", 0.01, 0.0, 1.0}}},
+      {Sensor::kCamera,
+       FaultKind::kWhite,
+       "camera.white",
+       "light is added everywhere, in shares of full scale",
+       {{"glare", 1.5, 0.0, 10.0}}},
+      {Sensor::kCamera,
+       FaultKind::kOcclude,
+       "camera.occlude",
+       "something grey hides a share of the picture, from the left",
+       {{"share", 0.5, 0.0, 1.0}}},
+      {Sensor::kCamera,
+       FaultKind::kCorrupt,
+       "camera.corrupt",
+       "the picture's file is damaged on the way",
+       {{"probability", 0.5, 0.0, 1.0}}},
   };
   types.insert(types.end(), own.begin(), own.end());
+  for (FaultType& type : types) {
+    if (type.sensor != Sensor::kCamera) continue;
+    for (const char* eye : {"left", "right"}) type.parameters.push_back({eye, 1.0, 0.0, 1.0});
+  }
   return types;
 }
 

@@ -2,7 +2,7 @@
 /// start and start + duration (true time) and nothing else: no other sensor, no other sample, no other noise.
 ///
 /// As text: SENSOR.KIND@START[+DURATION][:KEY=VALUE,...], for example gnss.bias@30+5:east_m=15. Without a duration it
-/// lasts to the end of the drive.
+/// lasts to the end of the drive. Those of the camera can leave out one eye: camera.dark@10:right=0.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace roadfix {
 
-enum class Sensor { kImu, kGnss, kWheels, kMag };
+enum class Sensor { kImu, kGnss, kWheels, kMag, kCamera };
 
 enum class FaultKind {
   // Of every sensor.
@@ -40,6 +40,10 @@ enum class FaultKind {
   kScale,
   kUnsigned,
   kDisturb,
+  kDark,
+  kWhite,
+  kOcclude,
+  kCorrupt,
 };
 
 struct FaultParameter {

@@ -54,9 +54,9 @@ void apply(ActiveFault& fault, Fate& fate) {
 }  // namespace
 
 std::vector<Passage> pass(const SimulatedDrive& drive, Sensor sensor, const LinkConfig& link,
-                          const std::vector<std::int64_t>& true_times) {
+                          const std::vector<std::int64_t>& true_times, const char* part) {
   RandomStream random = stream_of(drive, NoiseStream::kLink, static_cast<std::uint64_t>(sensor));
-  FaultSet faults(drive, sensor);
+  FaultSet faults(drive, sensor, part);
   std::vector<Passage> passages;
   passages.reserve(true_times.size());
   std::int64_t seq = 0;

@@ -15,21 +15,22 @@ struct Passage {
   Delivery delivery;
 };
 
-/// What arrives of samples measured at these times, in order of measurement.
+/// What arrives of samples measured at these times, in order of measurement. `part`: one eye of the cameras; without
+/// faults of one eye, both have the same passages.
 std::vector<Passage> pass(const SimulatedDrive& drive, Sensor sensor, const LinkConfig& link,
-                          const std::vector<std::int64_t>& true_times);
+                          const std::vector<std::int64_t>& true_times, const char* part = nullptr);
 
 /// Sends samples through the link; `errors`, where given, stay aligned with them.
 template <class Sample, class Error>
 void deliver(const SimulatedDrive& drive, Sensor sensor, const LinkConfig& link, std::vector<Sample>& samples,
-             std::vector<Error>* errors, std::vector<Delivery>& deliveries) {
+             std::vector<Error>* errors, std::vector<Delivery>& deliveries, const char* part = nullptr) {
   std::vector<std::int64_t> times;
   times.reserve(samples.size());
   for (const Sample& s : samples) times.push_back(s.t_us);
   std::vector<Sample> arrived;
   std::vector<Error> arrived_errors;
   arrived.reserve(samples.size());
-  for (const Passage& p : pass(drive, sensor, link, times)) {
+  for (const Passage& p : pass(drive, sensor, link, times, part)) {
     arrived.push_back(samples[p.payload]);
     arrived.back().t_us = p.stamp_us;
     if (errors != nullptr) arrived_errors.push_back((*errors)[p.measured]);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "samples/samples.h"
+#include "simulation/camera_config.h"
 #include "simulation/faults.h"
 
 namespace roadfix {
@@ -34,17 +35,6 @@ struct MotionConfig {
   double hill_factor = 1.0;           ///< on the terrain: at 1, slopes to about 4 %
   double roll_rad_per_mps2 = 0.004;   ///< body lean by lateral acceleration (about 2.2 deg per g)
   double pitch_rad_per_mps2 = 0.002;  ///< dive and squat by longitudinal acceleration
-};
-
-/// From the sensor to the log: stamps and transport. A message is stamped true time + offset + drift + jitter and
-/// arrives at true time + delay + up to delay_jitter.
-struct LinkConfig {
-  double clock_offset_s = 0.0;
-  double clock_drift_ppm = 0.0;  ///< of the clock that stamps, from the start of the drive
-  double stamp_jitter_s = 0.0;   ///< standard deviation
-  double delay_s = 0.0;
-  double delay_jitter_s = 0.0;  ///< uniform in [0, this]
-  double drop_probability = 0.0;
 };
 
 struct ImuConfig {
@@ -125,6 +115,8 @@ struct ScenarioConfig {
   GnssConfig gnss;
   WheelsConfig wheels;
   MagConfig mag;
+  CameraConfig camera;
+  SceneConfig scene;
   std::vector<Fault> faults;
 };
 
@@ -147,16 +139,6 @@ void visit(MotionConfig& c, Visitor& v) {
   v.number("hill_factor", c.hill_factor, 0.0, 3.0);
   v.number("roll_rad_per_mps2", c.roll_rad_per_mps2, 0.0, 0.05);
   v.number("pitch_rad_per_mps2", c.pitch_rad_per_mps2, 0.0, 0.05);
-}
-
-template <class Visitor>
-void visit(LinkConfig& c, Visitor& v) {
-  v.number("clock_offset_s", c.clock_offset_s, -10.0, 10.0);
-  v.number("clock_drift_ppm", c.clock_drift_ppm, -1e4, 1e4);
-  v.number("stamp_jitter_s", c.stamp_jitter_s, 0.0, 1.0);
-  v.number("delay_s", c.delay_s, 0.0, 10.0);
-  v.number("delay_jitter_s", c.delay_jitter_s, 0.0, 10.0);
-  v.number("drop_probability", c.drop_probability, 0.0, 1.0);
 }
 
 template <class Visitor>
@@ -246,6 +228,8 @@ void visit(ScenarioConfig& c, Visitor& v) {
   v.group("gnss", c.gnss);
   v.group("wheels", c.wheels);
   v.group("mag", c.mag);
+  v.group("camera", c.camera);
+  v.group("scene", c.scene);
   v.groups("faults", c.faults);
 }
 

@@ -25,24 +25,31 @@ void add_faults(ScenarioConfig& c, std::initializer_list<const char*> texts) {
   for (const char* text : texts) c.faults.push_back(parse_fault(text));
 }
 
+void set_scene(ScenarioConfig& c, std::vector<SceneSegment> segments) { c.scene.segments = std::move(segments); }
+
 /// The course of paper C: a minute of open sky, half a minute of bad fixes under a bridge, a minute of tunnel, and
 /// fixes that are off when they come back.
-void set_tunnel(ScenarioConfig& c) {
+void set_tunnel(ScenarioConfig& c, StreetKind tunnel) {
   c.motion.route = RouteKind::kTunnel;
   c.duration_s = 210.0;
   use_street_receiver(c.gnss);
   add_faults(c, {"gnss.multipath@60+30:sigma_m=4,correlation_s=6,claim=0.5", "gnss.silence@90+60",
                  "gnss.reacquire@150+12:error_m=4,decay_s=3"});
+  set_scene(c, {{0.0, StreetKind::kStreet}, {60.0, StreetKind::kBridge}, {90.0, tunnel}, {150.0, StreetKind::kStreet}});
 }
 
 /// Ninety seconds of the same, for logs/demo.lcm.
 void set_demo(ScenarioConfig& c) {
-  set_tunnel(c);
+  set_tunnel(c, StreetKind::kTunnelLit);
   c.faults.clear();
   c.duration_s = 90.0;
   c.gnss.rate_hz = 4.0;
   add_faults(c, {"gnss.multipath@20+10:sigma_m=3,correlation_s=4,claim=0.6", "gnss.silence@30+30",
                  "gnss.reacquire@60+8:error_m=3,decay_s=2"});
+  set_scene(c, {{0.0, StreetKind::kStreet},
+                {20.0, StreetKind::kBridge},
+                {30.0, StreetKind::kTunnelLit},
+                {60.0, StreetKind::kStreet}});
 }
 
 /// Half an hour among houses: correlated errors throughout, a bridge every four minutes, a tunnel every ten, slippery
@@ -81,19 +88,23 @@ const std::vector<Scenario>& scenarios() {
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kHighway;
          c.duration_s = 180.0;
+         set_scene(c, {{0.0, StreetKind::kHighway}});
        }},
       {"car_park", "tight turns at walking pace, reversing into bays",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kCarPark;
          c.duration_s = 180.0;
+         set_scene(c, {{0.0, StreetKind::kCarPark}});
        }},
       {"cold_start_moving", "begins at 30 m/s on a highway",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kColdStartMoving;
          c.duration_s = 120.0;
+         set_scene(c, {{0.0, StreetKind::kHighway}});
        }},
-      {"tunnel_lit", "open sky, 30 s of bad fixes under a bridge, 60 s of lit tunnel", set_tunnel},
-      {"tunnel_dark", "the same with a dark tunnel", set_tunnel},
+      {"tunnel_lit", "open sky, 30 s of bad fixes under a bridge, 60 s of lit tunnel",
+       [](ScenarioConfig& c) { set_tunnel(c, StreetKind::kTunnelLit); }},
+      {"tunnel_dark", "the same with a dark tunnel", [](ScenarioConfig& c) { set_tunnel(c, StreetKind::kTunnelDark); }},
       {"long_city", "half an hour of city streets, with bridges, tunnels, slip and disturbed fields", set_long_city},
       {"demo", "90 s: open, bridge, tunnel, open; the drive of logs/demo.lcm", set_demo},
       {"turn", "a minute straight on at constant speed, then a right angle",
@@ -109,6 +120,7 @@ const std::vector<Scenario>& scenarios() {
          c.motion.hill_factor = 0.0;
          c.gnss.rate_hz = 0.0;
          c.duration_s = 150.0;
+         set_scene(c, {{0.0, StreetKind::kCorridor}});
        }},
   };
   return all;

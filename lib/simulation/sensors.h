@@ -31,6 +31,9 @@ enum class NoiseStream : std::uint64_t {
   kLink = 20,
   kFault = 21,
   kGnssHeading = 22,
+  kCameraMounting = 23,
+  kScene = 24,
+  kPicture = 25,
 };
 
 /// `instance` tells sources of one kind apart, below 2^56.
@@ -45,12 +48,13 @@ struct ActiveFault {
   const Fault* operator->() const { return fault; }
 };
 
-/// The faults of one sensor, in the order of the configuration.
+/// The faults of one sensor, in the order of the configuration; of one part of it where a switch of that name turns
+/// them off.
 class FaultSet {
  public:
-  FaultSet(const SimulatedDrive& drive, Sensor sensor) {
+  FaultSet(const SimulatedDrive& drive, Sensor sensor, const char* part = nullptr) {
     for (const Fault& f : drive.config.faults) {
-      if (f.sensor != sensor) continue;
+      if (f.sensor != sensor || (part != nullptr && f.get(part) < 0.5)) continue;
       const auto start_ms = static_cast<std::uint64_t>(f.start_s * 1e3);
       const auto kind = static_cast<std::uint64_t>(f.kind) * 8U + static_cast<std::uint64_t>(sensor);
       faults_.push_back({&f, stream_of(drive, NoiseStream::kFault, kind + (start_ms << 16U))});
@@ -73,6 +77,7 @@ void simulate_imu(SimulatedDrive& drive);
 void simulate_gnss(SimulatedDrive& drive);
 void simulate_wheels(SimulatedDrive& drive);
 void simulate_mag(SimulatedDrive& drive);
+void simulate_camera(SimulatedDrive& drive);
 
 /// Angular rate and specific force that a perfect imu measures at one instant, imu axes.
 struct InertialState {

@@ -89,6 +89,7 @@ SimulatedDrive simulate(const ScenarioConfig& config, std::uint64_t seed) {
   simulate_gnss(drive);
   simulate_wheels(drive);
   simulate_mag(drive);
+  simulate_camera(drive);
   for (const std::int64_t t_us : sample_times(config.truth_rate_hz, 0.0, config.duration_s)) {
     drive.truth.push_back(drive.truth_at(config.start_utime + t_us));
   }

@@ -35,6 +35,22 @@ struct GnssError {
   double heading = 0.0;                                ///< rad
 };
 
+/// What faults do to one picture besides its way to the log.
+struct PictureEffects {
+  double light_factor = 1.0;     ///< on the light that falls in
+  double glare = 0.0;            ///< light added, in shares of full scale
+  double noise_factor = 1.0;     ///< on the standard deviation
+  double occluded_share = 0.0;   ///< of the width, from the left
+  std::uint64_t corruption = 0;  ///< not 0: the file is damaged; seeds where
+};
+
+/// One picture as a camera gives it.
+struct Picture {
+  std::int64_t t_us = 0;     ///< stamp
+  std::size_t exposure = 0;  ///< which of SimulatedDrive::exposures it shows
+  PictureEffects effects;
+};
+
 /// How the sample with the same index came about and reached the log.
 struct Delivery {
   std::int64_t seq = 0;         ///< counts what the sensor sent: a message lost on the way leaves a gap
@@ -43,7 +59,7 @@ struct Delivery {
 };
 
 struct Deliveries {
-  std::vector<Delivery> imu, gnss, wheels, mag;
+  std::vector<Delivery> imu, gnss, wheels, mag, camera_left, camera_right;
 };
 
 struct SimulationErrors {
@@ -57,6 +73,7 @@ struct SimulationErrors {
   double yaw_rate_bias = 0.0;                                         ///< rad/s, of the car's own sensor
   Eigen::Vector3d hard_iron = Eigen::Vector3d::Zero();                ///< T, true
   Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();            ///< measured = soft_iron * field + hard_iron
+  SE3 T_vehicle_left;                                                 ///< true place of the left camera
 };
 
 struct SimulatedDrive {
@@ -69,6 +86,9 @@ struct SimulatedDrive {
   std::vector<GnssFix> gnss;
   std::vector<WheelSample> wheels;
   std::vector<MagSample> mag;
+  std::vector<std::int64_t> exposures;  ///< true times of the middle of the cameras' exposures, microseconds, UTC
+  std::vector<Picture> pictures_left;   ///< what arrives of them, without pixels: scene/film.h draws those
+  std::vector<Picture> pictures_right;
   std::vector<Odometry> truth;  ///< at config.truth_rate_hz, exact, covariance zero, T_frame_vehicle in enu
   SimulationErrors errors;
   Deliveries deliveries;  ///< per sample, in order of measurement; not of arrival

@@ -2,15 +2,20 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
+#include <cstdio>
+#include <functional>
 #include <iostream>
 #include <memory>
+#include <thread>
 
 #include "roadfix/commands.h"
 #include "roadfix/import/drive_log.h"
 #include "roadfix/simulate/scenario_file.h"
 #include "roadfix/simulate/simulated_log.h"
 #include "simulation/scenarios.h"
+#include "stream/thread_pool.h"
 
 namespace roadfix {
 namespace {
@@ -21,6 +26,13 @@ struct Options {
   std::filesystem::path out;
   std::filesystem::path vehicle;
   double duration_s = 0.0;
+  bool mono = false;
+  bool stereo = false;
+  bool no_camera = false;
+  double camera_rate_hz = 0.0;
+  std::string picture_size;
+  bool png = false;
+  int threads = 0;
   std::vector<std::string> faults;
   bool list = false;
   bool print_config = false;
@@ -41,10 +53,37 @@ void print_list() {
   }
 }
 
+void set_camera(const Options& options, CameraConfig& camera) {
+  if (options.mono) camera.layout = CameraLayout::kMono;
+  if (options.stereo) camera.layout = CameraLayout::kStereo;
+  if (options.no_camera) camera.layout = CameraLayout::kNone;
+  if (options.camera_rate_hz > 0.0) camera.rate_hz = options.camera_rate_hz;
+  if (options.png) camera.lossless = true;
+  if (options.picture_size.empty()) return;
+  int width = 0;
+  int height = 0;
+  char end = 0;
+  if (std::sscanf(options.picture_size.c_str(), "%4dx%4d%c", &width, &height, &end) != 2 || width < 64 || height < 48)
+    throw std::runtime_error("simulate: --picture-size is WIDTHxHEIGHT, at least 64x48, not " + options.picture_size);
+  camera = with_size(camera, width, height);
+}
+
+/// A line on standard error for each tenth of the exposures.
+std::function<void(std::size_t)> progress_lines(std::size_t exposures) {
+  const auto begin = std::chrono::steady_clock::now();
+  return [exposures, begin](std::size_t done) {
+    if (exposures < 10 || done * 10 / exposures == (done - 1) * 10 / exposures) return;
+    const double taken_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    std::cerr << fmt::format("simulate: {} of {} exposures, {:.1f} a second\n", done, exposures,
+                             static_cast<double>(done) / taken_s);
+  };
+}
+
 ScenarioConfig configured(const Options& options) {
   if (options.scenario.empty()) throw std::runtime_error("simulate: which scenario? (--list shows all)");
   ScenarioConfig config = load_scenario(options.scenario);
   if (options.duration_s > 0.0) config.duration_s = options.duration_s;
+  set_camera(options, config.camera);
   for (const std::string& text : options.faults) config.faults.push_back(parse_fault(text));
   return config;
 }
@@ -62,13 +101,19 @@ void run(const Options& options) {
   if (!options.vehicle.empty()) {
     write_vehicle(calibration_of(config), config.name, options.vehicle, options.overwrite);
   }
-  const std::string summary = write_simulated_log(drive, options.out);
+  ThreadPool threads(options.threads > 0 ? options.threads
+                                         : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  const std::string summary =
+      write_simulated_log(drive, options.out, {threads, progress_lines(drive.exposures.size())});
   const double taken_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::cout << options.out.string() << ": " << config.name << ", seed " << options.seed << "\n" << summary;
   if (!options.vehicle.empty()) std::cout << "vehicle: " << options.vehicle.string() << "\n";
   if (options.timing) {
     std::cout << fmt::format("{:.0f} s simulated and written in {:.2f} s: {:.0f} x real time\n", config.duration_s,
                              taken_s, config.duration_s / taken_s);
+    if (!drive.exposures.empty())
+      std::cout << fmt::format("{} exposures: {:.2f} a second\n", drive.exposures.size(),
+                               static_cast<double>(drive.exposures.size()) / taken_s);
   }
 }
 
@@ -83,6 +128,14 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--vehicle", options->vehicle, "folder for calibration.yaml");
   command->add_option("--duration", options->duration_s, "s, in place of the scenario's own")
       ->check(CLI::Range(1.0, 86400.0));
+  auto* mono = command->add_flag("--mono", options->mono, "with one camera");
+  auto* stereo = command->add_flag("--stereo", options->stereo, "with two cameras")->excludes(mono);
+  command->add_flag("--no-camera", options->no_camera, "without the scenario's cameras")->excludes(mono, stereo);
+  command->add_option("--camera-rate-hz", options->camera_rate_hz, "pictures a second")->check(CLI::Range(0.1, 100.0));
+  command->add_option("--picture-size", options->picture_size, "WIDTHxHEIGHT in px; the field of view stays");
+  command->add_flag("--png", options->png, "exact pictures instead of JPEG");
+  command->add_option("--threads", options->threads, "that draw; the bytes do not depend on it (default: all)")
+      ->check(CLI::Range(1, 256));
   command->add_option("--fault", options->faults, "NAME@START[+DURATION][:KEY=VALUE,...]; may be given again")
       ->allow_extra_args(false);
   command->add_flag("--list", options->list, "show scenarios and faults");

@@ -21,4 +21,20 @@ def long_city_xrt(runs):
     return statistics.median(factors)
 
 
-MEASUREMENTS = {"long_city_xrt": long_city_xrt}
+def stereo_fps(runs):
+    """Stereo pairs of 1241x376 a second, drawn, exposed, written as JPEG into a log; 2 threads, 20 s of city_loop from a
+    cold start (the world and its trees are in the time), median of three."""
+    rates = []
+    for _ in range(REPEATS):
+        log = runs.folder("stereo") / "drive.lcm"
+        text = runs.roadfix("simulate", "city_loop", "--seed", 1, "--duration", 20, "--stereo", "--camera-rate-hz", 10,
+                            "--picture-size", "1241x376", "--threads", 2, "--out", log, "--timing")
+        found = re.search(r"([0-9]+) exposures: ([0-9.]+) a second", text)
+        if not found:
+            raise Skipped("roadfix simulate did not print its time")
+        rates.append(float(found.group(2)))
+        log.unlink()
+    return statistics.median(rates)
+
+
+MEASUREMENTS = {"long_city_xrt": long_city_xrt, "stereo_fps": stereo_fps}

@@ -2,7 +2,13 @@
 /// Every operation is exactly rounded, lane by lane, so the result does not depend on how pixels are grouped in lanes.
 #pragma once
 
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
+#include <cmath>
 #include <cstdint>
+#include <cstring>
 
 namespace roadfix {
 
@@ -15,11 +21,32 @@ using U8 = std::uint32_t __attribute__((vector_size(32)));
 inline F8 splat(float x) { return F8{x, x, x, x, x, x, x, x}; }
 inline U8 splat(std::uint32_t x) { return U8{x, x, x, x, x, x, x, x}; }
 inline F8 select(I8 mask, F8 yes, F8 no) { return mask ? yes : no; }
+inline U8 select(I8 mask, U8 yes, U8 no) { return mask ? yes : no; }
+inline F8 load(const float* from) {
+  F8 x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
+/// The first `count` lanes.
+template <class Element, class Lanes>
+void store(Element* to, const Lanes& x, int count) {
+  static_assert(sizeof(Element) * kLanes == sizeof(Lanes));
+  std::memcpy(to, &x, static_cast<std::size_t>(count) * sizeof(Element));
+}
 inline F8 min(F8 a, F8 b) { return a < b ? a : b; }
 inline F8 max(F8 a, F8 b) { return a > b ? a : b; }
 inline F8 abs(F8 a) { return max(a, -a); }
 inline F8 clamp(F8 x, F8 lo, F8 hi) { return min(max(x, lo), hi); }
 inline F8 clamp01(F8 x) { return clamp(x, splat(0.0F), splat(1.0F)); }
+/// One instruction where the compiler, minding errno, would make eight calls; the bits are the same.
+inline F8 root(F8 x) {
+#ifdef __AVX__
+  return (F8)_mm256_sqrt_ps((__m256)x);
+#else
+  for (int i = 0; i < kLanes; ++i) x[i] = std::sqrt(x[i]);
+  return x;
+#endif
+}
 inline F8 mix(F8 a, F8 b, F8 share) { return a + (b - a) * share; }
 inline F8 to_float(I8 x) { return __builtin_convertvector(x, F8); }
 inline I8 to_int(F8 x) { return __builtin_convertvector(x, I8); }

@@ -61,7 +61,6 @@ class QuadScene {
   QuadScene(RTCDevice device, const std::vector<std::array<float, 3>>& corners) {
     if (corners.empty()) return;
     scene_ = rtcNewScene(device);
-    //    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_QUAD);
     auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,

@@ -33,7 +33,7 @@ struct Renderer::Pixels {
 
 Renderer::Renderer(const World& world, const Camera& camera)
     : to_sun_(world.to_sun), width_(camera.intrinsics().width), height_(camera.intrinsics().height) {
-  ray_x_.reserve(static_cast<std::size_t>((width_ + 2) * (height_ + 2)));
+  ray_x_.reserve(static_cast<std::size_t>((width_ + 2) * (height_ + 2) + kLanes));
   ray_y_.reserve(ray_x_.capacity());
   for (int v = -1; v <= height_; ++v) {
     for (int u = -1; u <= width_; ++u) {
@@ -43,6 +43,8 @@ Renderer::Renderer(const World& world, const Camera& camera)
       ray_y_.push_back(static_cast<float>(n->y()));
     }
   }
+  // Whole lanes are read at the end of the last row.
+  for (auto* rays : {&ray_x_, &ray_y_}) rays->insert(rays->end(), kLanes, 0.0F);
 }
 
 Renderer::Pixels Renderer::directions(const int (&x)[kLanes], const int (&y)[kLanes]) const {
@@ -60,7 +62,37 @@ Renderer::Pixels Renderer::directions(const int (&x)[kLanes], const int (&y)[kLa
   return p;
 }
 
+Renderer::Pixels Renderer::row_of_pixels(int column, int row) const {
+  const auto stride = static_cast<std::size_t>(width_ + 2);
+  const std::size_t at = static_cast<std::size_t>(row + 1) * stride + static_cast<std::size_t>(column + 1);
+  const float* x = &ray_x_[at];
+  const float* y = &ray_y_[at];
+  return {load(x),
+          load(y),
+          0.5F * (load(x + 1) - load(x - 1)),
+          0.5F * (load(y + 1) - load(y - 1)),
+          0.5F * (load(x + stride) - load(x - stride)),
+          0.5F * (load(y + stride) - load(y - stride))};
+}
+
 namespace {
+
+/// What the light field keeps of the faces under eight pixels.
+struct Seen {
+  U8 group{};
+  F8 velocity[3] = {splat(0.0F), splat(0.0F), splat(0.0F)};
+};
+
+Seen seen_of(const RayWindow& window, const HitLanes& hit) {
+  Seen seen;
+  for (int i = 0; i < kLanes; ++i) {
+    if (hit.face[i] < 0) continue;
+    const FaceShade& face = window.faces()[static_cast<std::size_t>(hit.face[i])];
+    seen.group[i] = face.group;
+    for (std::size_t k = 0; k < 3; ++k) seen.velocity[k][i] = face.velocity[k];
+  }
+  return seen;
+}
 
 /// Rays through (x, y, 1) in camera axes, so that distances along them are depths.
 template <class Pixels>
@@ -87,33 +119,32 @@ void Renderer::first_pass(const Frame& frame, int band, LightField& out) const {
   const int end = std::min(height_, (band + 1) * kBandRows);
   for (int row = band * kBandRows; row < end; ++row) {
     for (int column = 0; column < width_; column += kLanes) {
-      int x[kLanes];
-      int y[kLanes];
-      for (int i = 0; i < kLanes; ++i) x[i] = std::min(column + i, width_ - 1), y[i] = row;
-      const Pixels p = directions(x, y);
+      const Pixels p = row_of_pixels(column, row);
       const PixelRays rays = rays_of(frame.R, frame.eye, p, 1.0F);
       const HitLanes hit = frame.window.intersect(rays.ray);
       const Shade s = shade(frame.window, frame.to_sun, rays, hit);
-      for (int i = 0; i < kLanes && column + i < width_; ++i) {
-        const auto at = static_cast<std::size_t>(row * width_ + column + i);
-        const bool sky = hit.face[i] < 0;
-        const FaceShade* face = sky ? nullptr : &frame.window.faces()[static_cast<std::size_t>(hit.face[i])];
-        out.radiance[at] = s.radiance[i];
-        out.depth[at] = sky ? std::numeric_limits<float>::infinity() : hit.distance[i];
-        out.surface[at] = sky ? 0U : 2U * face->group + (s.sunlit[i] != 0 ? 1U : 0U);
-        // Velocity of the point against the camera over its depth, in camera axes, then in pixels.
-        const Eigen::Vector3f d(rays.ray.dx[i], rays.ray.dy[i], rays.ray.dz[i]);
-        Eigen::Vector3f w = -frame.rate.cross(d);
-        if (!sky)
-          w += (Eigen::Vector3f(face->velocity[0], face->velocity[1], face->velocity[2]) - frame.drift) /
-               hit.distance[i];
-        const Eigen::Vector3f c = frame.R.transpose() * w;
-        const float nx = c.x() - p.x[i] * c.z();
-        const float ny = c.y() - p.y[i] * c.z();
-        const float determinant = p.x_u[i] * p.y_v[i] - p.x_v[i] * p.y_u[i];
-        out.flow_u[at] = (p.y_v[i] * nx - p.x_v[i] * ny) / determinant;
-        out.flow_v[at] = (p.x_u[i] * ny - p.y_u[i] * nx) / determinant;
-      }
+      const I8 sky = hit.face < 0;
+      const Seen seen = seen_of(frame.window, hit);
+      // Velocity of the point against the camera over its depth, in camera axes, then in pixels.
+      const RayLanes& d = rays.ray;
+      const F8 per_depth = select(sky, splat(0.0F), 1.0F / hit.distance);
+      const Eigen::Vector3f& rate = frame.rate;
+      const F8 wx = rate.z() * d.dy - rate.y() * d.dz + (seen.velocity[0] - frame.drift.x()) * per_depth;
+      const F8 wy = rate.x() * d.dz - rate.z() * d.dx + (seen.velocity[1] - frame.drift.y()) * per_depth;
+      const F8 wz = rate.y() * d.dx - rate.x() * d.dy + (seen.velocity[2] - frame.drift.z()) * per_depth;
+      const Eigen::Matrix3f& R = frame.R;
+      const F8 cz = R(0, 2) * wx + R(1, 2) * wy + R(2, 2) * wz;
+      const F8 nx = R(0, 0) * wx + R(1, 0) * wy + R(2, 0) * wz - p.x * cz;
+      const F8 ny = R(0, 1) * wx + R(1, 1) * wy + R(2, 1) * wz - p.y * cz;
+      const F8 per_determinant = 1.0F / (p.x_u * p.y_v - p.x_v * p.y_u);
+      const auto at = static_cast<std::size_t>(row * width_ + column);
+      const int count = std::min(kLanes, width_ - column);
+      store(&out.radiance[at], s.radiance, count);
+      store(&out.depth[at], select(sky, splat(std::numeric_limits<float>::infinity()), hit.distance), count);
+      store(&out.flow_u[at], (p.y_v * nx - p.x_v * ny) * per_determinant, count);
+      store(&out.flow_v[at], (p.x_u * ny - p.y_u * nx) * per_determinant, count);
+      const U8 surface = 2U * seen.group + (U8)(s.sunlit & 1);
+      store(&out.surface[at], select(sky, U8{}, surface), count);
     }
   }
 }
@@ -158,7 +189,7 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
   flush();
 }
 
-void Renderer::render(RayScene& scene, const View& view, const ParallelFor& parallel_for, LightField& out) const {
+void Renderer::render(RayScene& scene, const View& view, Executor& executor, LightField& out) const {
   const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s);
   const Eigen::Matrix3d R = view.T_enu_camera.R();
   const Frame frame{window,
@@ -173,8 +204,8 @@ void Renderer::render(RayScene& scene, const View& view, const ParallelFor& para
   for (auto* plane : {&out.radiance, &out.depth, &out.flow_u, &out.flow_v}) plane->resize(pixels);
   out.surface.resize(pixels);
   const int bands = (height_ + kBandRows - 1) / kBandRows;
-  parallel_for(bands, [&](int band) { first_pass(frame, band, out); });
-  parallel_for(bands, [&](int band) { edge_pass(frame, band, out); });
+  executor.for_each(bands, [&](int band) { first_pass(frame, band, out); });
+  executor.for_each(bands, [&](int band) { edge_pass(frame, band, out); });
 }
 
 }  // namespace roadfix

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "camera/camera.h"
-#include "simulation/scene/parallel.h"
 #include "simulation/scene/ray_scene.h"
+#include "stream/executor.h"
 
 namespace roadfix {
 
@@ -37,12 +37,14 @@ class Renderer {
   Renderer(const World& world, const Camera& camera);
 
   /// The scene may serve several cameras; it is left at this view's window.
-  void render(RayScene& scene, const View& view, const ParallelFor& parallel_for, LightField& out) const;
+  void render(RayScene& scene, const View& view, Executor& executor, LightField& out) const;
 
  private:
   struct Frame;
   struct Pixels;
   [[nodiscard]] Pixels directions(const int (&x)[kLanes], const int (&y)[kLanes]) const;
+  /// The eight pixels from (column, row) on; beyond the row's end it gives other ones.
+  [[nodiscard]] Pixels row_of_pixels(int column, int row) const;
   void first_pass(const Frame& frame, int band, LightField& out) const;
   void edge_pass(const Frame& frame, int band, LightField& out) const;
 

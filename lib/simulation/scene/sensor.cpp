@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "simulation/scene/lanes.h"
+
 namespace roadfix {
 namespace {
 
@@ -11,14 +13,12 @@ constexpr int kBandRows = 8;
 constexpr float kLongestBlur_px = 48.0F;
 constexpr float kShortestBlur_px = 0.1F;
 constexpr int kQuantiles = 4096;
+constexpr float kOccluder = 0.1F;       // radiance of dirt on the lens
+constexpr float kOccluderEdge = 0.03F;  // share of the width over which it fades
 
-std::uint32_t mix_bits32(std::uint32_t h) {  // the finaliser of MurmurHash3 (Appleby, 2011)
-  h ^= h >> 16;
-  h *= 0x85EBCA6BU;
-  h ^= h >> 13;
-  h *= 0xC2B2AE35U;
-  return h ^ (h >> 16);
-}
+constexpr U8 kLaneNumbers = {0, 1, 2, 3, 4, 5, 6, 7};
+
+std::uint32_t mix_bits32(std::uint32_t h) { return mix_bits(splat(h))[0]; }
 
 /// Midpoint quantiles of the normal distribution, by bisection of erfc: a draw is one look-up. Their variance is 0.999.
 std::array<float, kQuantiles> make_quantiles() {
@@ -85,33 +85,81 @@ Exposure next_exposure(const ExposureConfig& config, const SensorConfig& sensor,
   return next;
 }
 
-GrayImage expose(const SensorConfig& config, const LightField& light, const Exposure& exposure, std::uint64_t seed,
-                 std::uint64_t picture, const ParallelFor& parallel_for) {
+namespace {
+
+/// The arithmetic of one picture, the same for all of its pixels.
+struct Development {
+  float exposure_s;
+  float electrons_per_light;
+  float glare;  // electrons
+  float read_variance;
+  float noise_factor;
+  float well;
+  float per_electron;
+  float occluded_to;  // px; what hides the scene ends here, over kOccluderEdge of the width
+  float occluder_edge;
+  std::uint32_t key;
+  bool root_response;
+};
+
+Development development(const SensorConfig& config, int width, const Exposure& exposure, const Shot& shot) {
+  const PictureEffects& e = shot.effects;
+  Development d{};
+  d.exposure_s = static_cast<float>(exposure.time_s);
+  d.electrons_per_light =
+      static_cast<float>(e.light_factor * exposure.time_s / config.full_scale_s * config.full_well_electrons);
+  d.glare = static_cast<float>(e.glare * config.full_well_electrons / exposure.gain);
+  d.read_variance = static_cast<float>(config.read_noise_electrons * config.read_noise_electrons);
+  d.noise_factor = static_cast<float>(e.noise_factor);
+  d.well = static_cast<float>(config.full_well_electrons);
+  d.per_electron = static_cast<float>(exposure.gain / config.full_well_electrons);
+  d.occluder_edge = kOccluderEdge * static_cast<float>(width);
+  d.occluded_to = static_cast<float>(e.occluded_share * width);
+  const auto half = [](std::uint64_t x, int k) { return static_cast<std::uint32_t>(x >> (32 * k)); };
+  d.key = mix_bits32(
+      half(shot.seed, 0) ^
+      mix_bits32(half(shot.seed, 1) ^ mix_bits32(half(shot.number, 0) + 0x9E3779B9U * half(shot.number, 1))));
+  d.root_response = config.root_response;
+  return d;
+}
+
+/// Grey values of eight pixels from the light that falls on them; `at` is the first one's number.
+I8 grey_values(const Development& d, F8 radiance, F8 column, std::uint32_t at) {
   static const std::array<float, kQuantiles> kNormal = make_quantiles();
+  if (d.occluded_to > 0.0F) {
+    const F8 seen = clamp01((column - d.occluded_to) / d.occluder_edge + 1.0F);
+    radiance = select(seen < 1.0F, kOccluder + (radiance - kOccluder) * seen, radiance);
+  }
+  const F8 electrons = radiance * d.electrons_per_light + d.glare;
+  const U8 draw = mix_bits((at + kLaneNumbers) * 0x9E3779B1U + d.key) >> 20;
+  F8 noise;
+  for (int i = 0; i < kLanes; ++i) noise[i] = kNormal[draw[i]];
+  const F8 noisy = electrons + d.noise_factor * root(electrons + d.read_variance) * noise;
+  const F8 signal = clamp01(min(noisy, splat(d.well)) * d.per_electron);
+  return to_int(255.0F * (d.root_response ? root(signal) : signal) + 0.5F);
+}
+
+void develop_row(const Development& d, const LightField& light, int y, std::uint8_t* out) {
+  for (int x = 0; x < light.width; x += kLanes) {
+    const int count = std::min(kLanes, light.width - x);
+    F8 radiance = splat(0.0F);
+    for (int i = 0; i < count; ++i) radiance[i] = blurred(light, x + i, y, d.exposure_s);
+    const auto at = static_cast<std::uint32_t>(y * light.width + x);
+    const I8 grey = grey_values(d, radiance, to_float((I8)(static_cast<std::uint32_t>(x) + kLaneNumbers)), at);
+    for (int i = 0; i < count; ++i) out[x + i] = static_cast<std::uint8_t>(grey[i]);
+  }
+}
+
+}  // namespace
+
+GrayImage expose(const SensorConfig& config, const LightField& light, const Exposure& exposure, const Shot& shot,
+                 Executor& executor) {
   GrayImage out{light.width, light.height, std::vector<std::uint8_t>(light.radiance.size())};
-  const auto exposure_s = static_cast<float>(exposure.time_s);
-  const auto electrons_per_light =
-      static_cast<float>(exposure.time_s / config.full_scale_s * config.full_well_electrons);
-  const auto per_electron = static_cast<float>(exposure.gain / config.full_well_electrons);
-  const auto read_variance = static_cast<float>(config.read_noise_electrons * config.read_noise_electrons);
-  const auto well = static_cast<float>(config.full_well_electrons);
-  const std::uint32_t key = mix_bits32(static_cast<std::uint32_t>(seed) ^
-                                       mix_bits32(static_cast<std::uint32_t>(seed >> 32) ^
-                                                  mix_bits32(static_cast<std::uint32_t>(picture) +
-                                                             0x9E3779B9U * static_cast<std::uint32_t>(picture >> 32))));
-  const auto row = [&](int y) {
-    for (int x = 0; x < light.width; ++x) {
-      const auto at = static_cast<std::size_t>(y * light.width + x);
-      const float electrons = blurred(light, x, y, exposure_s) * electrons_per_light;
-      const std::uint32_t draw = mix_bits32(static_cast<std::uint32_t>(at) * 0x9E3779B1U + key) >> 20;
-      const float noisy = electrons + std::sqrt(electrons + read_variance) * kNormal[draw];
-      const float signal = std::clamp(std::min(noisy, well) * per_electron, 0.0F, 1.0F);
-      out.pixels[at] = static_cast<std::uint8_t>(255.0F * (config.root_response ? std::sqrt(signal) : signal) + 0.5F);
-    }
-  };
+  const Development d = development(config, light.width, exposure, shot);
   const int bands = (light.height + kBandRows - 1) / kBandRows;
-  parallel_for(bands, [&](int band) {
-    for (int y = band * kBandRows; y < std::min(light.height, (band + 1) * kBandRows); ++y) row(y);
+  executor.for_each(bands, [&](int band) {
+    for (int y = band * kBandRows; y < std::min(light.height, (band + 1) * kBandRows); ++y)
+      develop_row(d, light, y, &out.pixels[static_cast<std::size_t>(y * light.width)]);
   });
   return out;
 }

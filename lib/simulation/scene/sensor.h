@@ -6,8 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "simulation/scene/parallel.h"
 #include "simulation/scene/render.h"
+#include "simulation/simulate.h"
+#include "stream/executor.h"
 
 namespace roadfix {
 
@@ -44,8 +45,15 @@ struct GrayImage {
 Exposure next_exposure(const ExposureConfig& config, const SensorConfig& sensor, const Exposure& last,
                        const GrayImage& picture);
 
-/// The same light, exposure, seed and number of the picture give the same bytes.
-GrayImage expose(const SensorConfig& config, const LightField& light, const Exposure& exposure, std::uint64_t seed,
-                 std::uint64_t picture, const ParallelFor& parallel_for);
+/// What makes one picture different from another of the same light.
+struct Shot {
+  std::uint64_t seed = 0;    ///< of the sensor's noise
+  std::uint64_t number = 0;  ///< of the picture
+  PictureEffects effects;
+};
+
+/// The same light, exposure and shot give the same bytes.
+GrayImage expose(const SensorConfig& config, const LightField& light, const Exposure& exposure, const Shot& shot,
+                 Executor& executor);
 
 }  // namespace roadfix

@@ -122,8 +122,7 @@ F8 sky(const V8& d, const F8& length) {
 
 Shade shade(const RayWindow& window, const Eigen::Vector3f& to_sun, const PixelRays& pixels, const HitLanes& hit) {
   const V8 d{pixels.ray.dx, pixels.ray.dy, pixels.ray.dz};
-  F8 length = dot(d, d);
-  for (int i = 0; i < kLanes; ++i) length[i] = std::sqrt(length[i]);
+  const F8 length = root(dot(d, d));
   const I8 is_sky = hit.face < 0;
   Shade out{splat(0.0F), I8{}};
   if (any(hit.face >= 0)) {

@@ -8,19 +8,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "simulation/camera_config.h"
 #include "simulation/scene/world.h"
 
 namespace roadfix {
-
-enum class StreetKind {
-  kStreet,  ///< two lanes, parked cars, pavements, house fronts
-  kBridge,  ///< under a wide bridge: pillars on both sides, a deck 6 m above
-  kTunnelLit,
-  kTunnelDark,
-  kCorridor,  ///< bare walls 3 m apart, a ceiling
-  kHighway,   ///< three lanes, guard rails, gantries
-  kCarPark,   ///< a wide floor with bays and parked cars
-};
 
 /// From begin_m of distance driven up to the next one's begin.
 struct StreetSegment {

@@ -106,16 +106,19 @@ Cells cells_of(const SurfaceLanes& p, const LayerLanes& layer) {
 
 /// Value noise, zero mean: the lattice points' random values, joined smoothly.
 F8 smooth_noise(const Cells& c, U8 key) {
+  const F8 keep = clamp01(1.25F - c.wx) * clamp01(1.25F - c.wy);
+  if (!any(keep > 0.0F)) return splat(0.0F);
   const F8 ease_x = c.fx * c.fx * (3.0F - 2.0F * c.fx);
   const F8 ease_y = c.fy * c.fy * (3.0F - 2.0F * c.fy);
   const F8 low = mix(fraction(hash_cell(c.x, c.y, key), 0), fraction(hash_cell(c.x + 1, c.y, key), 0), ease_x);
   const F8 high = mix(fraction(hash_cell(c.x, c.y + 1, key), 0), fraction(hash_cell(c.x + 1, c.y + 1, key), 0), ease_x);
-  const F8 keep = clamp01(1.25F - c.wx) * clamp01(1.25F - c.wy);
   return c.amplitude * keep * (2.0F * mix(low, high, ease_y) - 1.0F);
 }
 
 /// In two of three cells a rectangle of random place, size and shade.
 F8 patches(const Cells& c, U8 key) {
+  const F8 keep = clamp01(2.0F - 2.0F * c.wx) * clamp01(2.0F - 2.0F * c.wy);
+  if (!any(keep > 0.0F)) return splat(0.0F);
   const U8 h = hash_cell(c.x, c.y, key);
   const U8 g = mix_bits(h + 0x9E3779B9U);
   const F8 left = 0.06F + 0.45F * fraction(h, 0);
@@ -123,7 +126,6 @@ F8 patches(const Cells& c, U8 key) {
   const F8 covered = coverage(c.fx, c.wx, left, left + 0.12F + 0.30F * fraction(h, 16)) *
                      coverage(c.fy, c.wy, bottom, bottom + 0.12F + 0.30F * fraction(h, 24));
   const F8 shade = 2.0F * fraction(g, 0) - 1.0F;
-  const F8 keep = clamp01(2.0F - 2.0F * c.wx) * clamp01(2.0F - 2.0F * c.wy);
   return select(fraction(g, 8) < 0.66F,
                 c.amplitude * keep * covered * (shade + select(shade < 0.0F, splat(-0.5F), splat(0.5F))), splat(0.0F));
 }

@@ -15,6 +15,7 @@
 #include "geometry/frames.h"
 #include "roadfix/import/drive_messages.h"
 #include "roadfix/simulate/scenario_file.h"
+#include "roadfix/simulate/simulated_pictures.h"
 #include "simulation/scenarios.h"
 
 namespace roadfix {
@@ -43,6 +44,15 @@ struct EventList {
                         m.seq = seq;
                         return encode(m);
                       }});
+  }
+
+  void add_pictures(const std::string& name, Eye eye, const std::vector<Delivery>& deliveries,
+                    SimulatedPictures& pictures) {
+    if (deliveries.empty()) return;
+    begin_channel(name);
+    for (std::size_t i = 0; i < deliveries.size(); ++i) {
+      add<image_t>(deliveries[i].arrival_us, deliveries[i].seq, [&pictures, eye, i] { return pictures.take(eye, i); });
+    }
   }
 
   void begin_channel(const std::string& name) {
@@ -116,6 +126,28 @@ double joint_correlation_s(double constant, double wandering, double tau_s) {
   return std::min(tau_s * (1.0 + ratio * ratio), kLongest);
 }
 
+CameraCalibration camera_calibration(const ScenarioConfig& config, const SE3& T_vehicle_camera) {
+  const CameraConfig& camera = config.camera;
+  CameraCalibration c;
+  c.rate = camera.rate_hz;
+  c.width_px = camera.width_px;
+  c.height_px = camera.height_px;
+  c.model = CameraModel::kPinhole;
+  c.intrinsics_px = camera.intrinsics_px;
+  c.distortion = CameraDistortion{};
+  if (!camera.distortion.isZero(0.0))
+    c.distortion = CameraDistortion{DistortionModel::kRadtan, {camera.distortion.begin(), camera.distortion.end()}};
+  c.colour = CameraColour::kGray;
+  c.time_offset_std = std::abs(camera.link.clock_offset_s);
+  c.stamp_jitter = camera.link.stamp_jitter_s;
+  const Eigen::Quaterniond& q = T_vehicle_camera.q;
+  c.mounting = CameraMounting{T_vehicle_camera.p - config.imu.position_m,
+                              {q.w(), q.x(), q.y(), q.z()},
+                              camera.mounting_std_m,
+                              camera.mounting_std_deg};
+  return c;
+}
+
 }  // namespace
 
 Calibration calibration_of(const ScenarioConfig& config) {
@@ -148,6 +180,12 @@ Calibration calibration_of(const ScenarioConfig& config) {
   if (config.mag.rate_hz > 0.0) {
     c.sensors.mag = MagCalibration{config.mag.declination_deg, config.mag.hard_iron_ut, Eigen::Matrix3d::Identity()};
   }
+  if (config.camera.layout != CameraLayout::kNone) {
+    const SE3 T_vehicle_left = nominal_T_vehicle_left(config.camera);
+    c.sensors.camera_left = camera_calibration(config, T_vehicle_left);
+    if (config.camera.layout == CameraLayout::kStereo)
+      c.sensors.camera_right = camera_calibration(config, T_vehicle_left * T_left_right(config.camera));
+  }
   return c;
 }
 
@@ -172,11 +210,18 @@ DriveFacts facts_of(const SimulatedDrive& drive) {
   return facts;
 }
 
-std::string write_simulated_log(const SimulatedDrive& drive, const std::filesystem::path& path) {
+std::string write_simulated_log(const SimulatedDrive& drive, const std::filesystem::path& path,
+                                const PictureWork& work) {
+  std::optional<SimulatedPictures> pictures;
+  if (drive.config.camera.layout != CameraLayout::kNone) pictures.emplace(drive, work.executor, work.progress);
   EventList list;
   list.run = drive.config.start_utime;
   list.begin_channel("CONFIG_DRIVE");
   list.add<config_t>(drive.config.start_utime, 0, [&] { return config_message(drive); });
+  if (pictures) {
+    list.add_pictures("CAMERA_LEFT", Eye::kLeft, drive.deliveries.camera_left, *pictures);
+    list.add_pictures("CAMERA_RIGHT", Eye::kRight, drive.deliveries.camera_right, *pictures);
+  }
   list.add_sensor<gnss_t>("GNSS", drive.gnss, drive.deliveries.gnss);
   list.add_sensor<imu_t>("IMU", drive.imu, drive.deliveries.imu);
   list.add_sensor<mag_t>("MAG", drive.mag, drive.deliveries.mag);

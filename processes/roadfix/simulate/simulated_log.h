@@ -1,15 +1,18 @@
 /// A simulated drive as an LCM log and a vehicle configuration, like those of `roadfix import`.
 ///
-/// The log's order and event times are those of arrival. REFERENCE is exact, of the imu's origin, in vehicle axes,
-/// with velocity and angular rate; CONFIG_DRIVE comes first. The same drive gives the same bytes.
+/// The log's order and event times are those of arrival; pictures are stamped with the middle of their exposure.
+/// REFERENCE is exact, of the imu's origin, in vehicle axes, with velocity and angular rate; CONFIG_DRIVE comes first.
+/// The same drive gives the same bytes.
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "config/calibration.h"
 #include "evaluation/drive_facts.h"
 #include "simulation/simulate.h"
+#include "stream/executor.h"
 
 namespace roadfix {
 
@@ -20,7 +23,14 @@ Calibration calibration_of(const ScenarioConfig& config);
 /// How the drive is to be scored; each GNSS silence is an outage.
 DriveFacts facts_of(const SimulatedDrive& drive);
 
-/// Returns one line per channel.
-std::string write_simulated_log(const SimulatedDrive& drive, const std::filesystem::path& path);
+/// Who draws the pictures, and who is told how many exposures are done.
+struct PictureWork {
+  Executor& executor;
+  std::function<void(std::size_t)> progress = [](std::size_t) {};
+};
+
+/// Returns one line per channel. Pictures are drawn while the log is written.
+std::string write_simulated_log(const SimulatedDrive& drive, const std::filesystem::path& path,
+                                const PictureWork& work);
 
 }  // namespace roadfix

@@ -6,6 +6,7 @@
 
 #include "geometry/so3.h"
 #include "simulation/scene/sensor.h"
+#include "stream/thread_pool.h"
 #include "unit/scene/streets.h"
 
 namespace roadfix {
@@ -98,7 +99,7 @@ TEST_CASE("a board's corners are found within 0.1 px of their projection and a s
   // Linear response: the root makes edges lean towards the dark side, by up to 0.1 px in a sharp picture.
   SensorConfig sensor;
   sensor.root_response = false;
-  GrayImage picture = expose(sensor, light, Exposure{}, 3, 0, serial_for);
+  GrayImage picture = expose(sensor, light, Exposure{}, {3, 0, {}}, test::inline_executor());
   const cv::Mat grey(picture.height, picture.width, CV_8U, picture.pixels.data());
   const CornerErrors noisy = corner_errors(world, grey, camera);
   CAPTURE(noisy.mean.norm(), noisy.largest);
@@ -137,8 +138,9 @@ TEST_CASE("same seed gives the same bytes on one thread and on three, another se
   const StreetPlan plan = test::street();
   const Camera camera(test::lens(330, 118));  // bands and lanes left over at the end
   const auto picture = [&](const StreetPlan& p, int threads) {
-    const LightField light = test::draw(build_world(p), camera, test::view_at(plan, 100), test::on_threads(threads));
-    return expose(SensorConfig{}, light, Exposure{}, 5, 2, test::on_threads(threads)).pixels;
+    ThreadPool pool(threads);
+    const LightField light = test::draw(build_world(p), camera, test::view_at(plan, 100), pool);
+    return expose(SensorConfig{}, light, Exposure{}, {5, 2, {}}, pool).pixels;
   };
   const auto once = picture(plan, 1);
   CHECK(once == picture(plan, 1));

@@ -32,7 +32,7 @@ Moments moments(const GrayImage& g) {
 /// Measured variance over that of shot and read noise (and of rounding), grey values, linear response.
 double variance_ratio(const SensorConfig& truth, const SensorConfig& assumed, float radiance, double gain) {
   const Exposure exposure{truth.full_scale_s, gain};
-  const Moments m = moments(expose(truth, flat(400, 300, radiance), exposure, 9, 4, serial_for));
+  const Moments m = moments(expose(truth, flat(400, 300, radiance), exposure, {9, 4, {}}, test::inline_executor()));
   const double grey_per_electron = 255.0 * gain / assumed.full_well_electrons;
   const double electrons = radiance * assumed.full_well_electrons;
   const double read = assumed.read_noise_electrons;
@@ -56,7 +56,7 @@ TEST_CASE("noise differs from picture to picture and from seed to seed") {
   const LightField light = flat(64, 64, 0.3F);
   const SensorConfig config;
   const auto bytes = [&](std::uint64_t seed, std::uint64_t picture) {
-    return expose(config, light, Exposure{}, seed, picture, serial_for).pixels;
+    return expose(config, light, Exposure{}, {seed, picture, {}}, test::inline_executor()).pixels;
   };
   CHECK(bytes(1, 1) == bytes(1, 1));
   CHECK(bytes(1, 1) != bytes(1, 2));
@@ -75,7 +75,7 @@ TEST_CASE("an edge that moves is blurred over its way and stays centred") {
   config.full_well_electrons = 1e9;  // no noise to speak of
   const auto row = [&](double exposure_s) {
     config.full_scale_s = exposure_s;
-    const auto g = expose(config, light, Exposure{exposure_s, 1.0}, 1, 1, serial_for);
+    const auto g = expose(config, light, Exposure{exposure_s, 1.0}, {1, 1, {}}, test::inline_executor());
     return std::vector<int>(g.pixels.begin() + 4 * 200, g.pixels.begin() + 5 * 200);
   };
   const auto width = [](const std::vector<int>& r) {
@@ -94,8 +94,8 @@ TEST_CASE("exposure goes to its target in bounded steps and stops at its limits"
   const auto run = [&](float radiance, Exposure e) {
     int steps = 0;
     for (; steps < 100; ++steps) {
-      const Exposure next =
-          next_exposure(config.exposure, config, e, expose(config, flat(32, 32, radiance), e, 1, 1, serial_for));
+      const Exposure next = next_exposure(
+          config.exposure, config, e, expose(config, flat(32, 32, radiance), e, {1, 1, {}}, test::inline_executor()));
       const double ratio = next.time_s * next.gain / (e.time_s * e.gain);
       CHECK(ratio <= config.exposure.fastest_step * 1.0001);
       CHECK(ratio >= 0.9999 / config.exposure.fastest_step);
@@ -106,7 +106,7 @@ TEST_CASE("exposure goes to its target in bounded steps and stops at its limits"
   };
   const auto [steps, day] = run(0.4F, Exposure{});
   CHECK(steps < 10);
-  CHECK(moments(expose(config, flat(32, 32, 0.4F), day, 1, 1, serial_for)).mean ==
+  CHECK(moments(expose(config, flat(32, 32, 0.4F), day, {1, 1, {}}, test::inline_executor())).mean ==
         Approx(255.0 * std::sqrt(config.exposure.target)).epsilon(0.05));
   const auto [dark_steps, tunnel] = run(0.01F, day);
   CHECK(dark_steps > 8);  // the mouth of a tunnel is dark for about a second

@@ -14,7 +14,8 @@ namespace roadfix {
 namespace {
 
 cv::Mat grey(const World& world, const Camera& camera, const View& view, double exposure_s) {
-  GrayImage g = expose(SensorConfig{}, test::draw(world, camera, view), Exposure{exposure_s, 1.0}, 1, 1, serial_for);
+  GrayImage g = expose(SensorConfig{}, test::draw(world, camera, view), Exposure{exposure_s, 1.0}, {1, 1, {}},
+                       test::inline_executor());
   return cv::Mat(g.height, g.width, CV_8U, g.pixels.data()).clone();
 }
 

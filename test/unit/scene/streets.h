@@ -2,24 +2,15 @@
 #pragma once
 
 #include <cmath>
-#include <thread>
 
 #include "simulation/scene/render.h"
 #include "simulation/scene/street.h"
 
 namespace roadfix::test {
 
-/// On `threads` threads, task i on thread i modulo their number.
-inline ParallelFor on_threads(int threads) {
-  return [threads](int count, const std::function<void(int)>& task) {
-    std::vector<std::thread> workers;
-    for (int k = 0; k < threads; ++k) {
-      workers.emplace_back([&, k] {
-        for (int i = k; i < count; i += threads) task(i);
-      });
-    }
-    for (auto& w : workers) w.join();
-  };
+inline Executor& inline_executor() {
+  static InlineExecutor executor;
+  return executor;
 }
 
 /// A line of way: lengths and turns (rad), from the origin to the east.
@@ -69,10 +60,10 @@ inline View view_at(const StreetPlan& plan, std::size_t i, double speed = 12.0) 
 }
 
 inline LightField draw(const World& world, const Camera& camera, const View& view,
-                       const ParallelFor& parallel_for = serial_for) {
+                       Executor& executor = inline_executor()) {
   RayScene scene(world);
   LightField light;
-  Renderer(world, camera).render(scene, view, parallel_for, light);
+  Renderer(world, camera).render(scene, view, executor, light);
   return light;
 }
 

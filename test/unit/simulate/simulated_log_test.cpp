@@ -25,6 +25,11 @@ std::string bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+std::string write(const SimulatedDrive& drive, const std::filesystem::path& path) {
+  InlineExecutor executor;
+  return write_simulated_log(drive, path, {executor});
+}
+
 SimulatedDrive short_drive(const std::string& fault = "") {
   ScenarioConfig config = scenario("demo");
   config.duration_s = 70.0;
@@ -44,11 +49,11 @@ std::vector<Message> messages(const std::filesystem::path& path, const std::stri
 
 TEST_CASE("the same drive gives the same bytes, another seed others") {
   const test::TemporaryFolder folder;
-  write_simulated_log(short_drive(), folder / "a.lcm");
-  write_simulated_log(short_drive(), folder / "b.lcm");
+  write(short_drive(), folder / "a.lcm");
+  write(short_drive(), folder / "b.lcm");
   ScenarioConfig config = scenario("demo");
   config.duration_s = 70.0;
-  write_simulated_log(simulate(config, 6), folder / "c.lcm");
+  write(simulate(config, 6), folder / "c.lcm");
   CHECK(bytes_of(folder / "a.lcm") == bytes_of(folder / "b.lcm"));
   CHECK(bytes_of(folder / "a.lcm") != bytes_of(folder / "c.lcm"));
 }
@@ -57,7 +62,7 @@ TEST_CASE("the log lies in order of arrival, its messages carry their own time")
   const test::TemporaryFolder folder;
   const std::filesystem::path path = folder / "drive.lcm";
   const SimulatedDrive drive = short_drive("imu.delay@10+5:jitter_s=0.05");
-  write_simulated_log(drive, path);
+  write(drive, path);
   LogReader reader(path);
   std::int64_t newest = 0;
   std::int64_t newest_imu = 0;
@@ -86,7 +91,7 @@ TEST_CASE("REFERENCE is the truth at the imu") {
   config.duration_s = 60.0;
   config.imu.position_m = {1.0, 0.2, 0.5};
   const SimulatedDrive drive = simulate(config, 5);
-  write_simulated_log(drive, folder / "drive.lcm");
+  write(drive, folder / "drive.lcm");
   const auto reference = messages<pose_t>(folder / "drive.lcm", "REFERENCE");
   REQUIRE(reference.size() == 601);
   for (const pose_t& pose : reference) {
@@ -115,7 +120,7 @@ TEST_CASE("the silence of the receiver is an outage of the facts") {
 TEST_CASE("CONFIG_DRIVE carries facts, calibration and the scenario with its seed") {
   const test::TemporaryFolder folder;
   const SimulatedDrive drive = short_drive();
-  write_simulated_log(drive, folder / "drive.lcm");
+  write(drive, folder / "drive.lcm");
   const auto config = messages<config_t>(folder / "drive.lcm", "CONFIG_DRIVE");
   REQUIRE(config.size() == 1);
   CHECK_THAT(config[0].config_yaml, Catch::Matchers::Contains("seed 5"));
@@ -129,10 +134,10 @@ TEST_CASE("a scenario as it stands is named, another one spelled out so that it 
   const test::TemporaryFolder folder;
   ScenarioConfig config = scenario("corridor");
   config.duration_s = 20.0;
-  write_simulated_log(simulate(config, 9), folder / "changed.lcm");
+  write(simulate(config, 9), folder / "changed.lcm");
   const std::string changed = messages<config_t>(folder / "changed.lcm", "CONFIG_DRIVE").at(0).config_yaml;
   CHECK_THAT(changed, Catch::Matchers::Contains("duration_s: 20") && Catch::Matchers::Contains("seed 9"));
-  write_simulated_log(simulate(scenario("demo"), 1), folder / "named.lcm");
+  write(simulate(scenario("demo"), 1), folder / "named.lcm");
   const std::string named = messages<config_t>(folder / "named.lcm", "CONFIG_DRIVE").at(0).config_yaml;
   CHECK_THAT(named, Catch::Matchers::StartsWith("# Simulated: demo, seed 1.\n"));
   CHECK_THAT(named, !Catch::Matchers::Contains("gyro_noise"));
@@ -141,7 +146,7 @@ TEST_CASE("a scenario as it stands is named, another one spelled out so that it 
 TEST_CASE("logs/demo.lcm and configs/demo are what their command makes") {
   const test::TemporaryFolder folder;
   const ScenarioConfig config = load_scenario("demo");
-  write_simulated_log(simulate(config, 1), folder / "demo.lcm");
+  write(simulate(config, 1), folder / "demo.lcm");
   CHECK(bytes_of(folder / "demo.lcm") == bytes_of(test::source_path("logs/demo.lcm")));
   CHECK(calibration_text(load_calibration(test::source_path("configs/demo"))) ==
         calibration_text(calibration_of(config)));

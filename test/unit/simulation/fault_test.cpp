@@ -19,6 +19,7 @@ constexpr double kDuration = 20.0;
 ScenarioConfig base() {
   ScenarioConfig c = scenario("city_loop");
   c.duration_s = 80.0;
+  c.camera.layout = CameraLayout::kStereo;
   return c;
 }
 
@@ -65,6 +66,17 @@ Rows rows_of(const SimulatedDrive& drive, Sensor sensor) {
       row.push_back(double(int(s.direction)));
       begin(rows, drive, s.t_us, drive.deliveries.wheels[i], row);
     }
+  } else if (sensor == Sensor::kCamera) {
+    const auto add = [&](double eye, const std::vector<Picture>& pictures, const std::vector<Delivery>& deliveries) {
+      for (std::size_t i = 0; i < pictures.size(); ++i) {
+        const PictureEffects& e = pictures[i].effects;
+        begin(rows, drive, pictures[i].t_us, deliveries[i],
+              {eye, double(pictures[i].exposure), e.light_factor, e.glare, e.noise_factor, e.occluded_share,
+               double(e.corruption)});
+      }
+    };
+    add(0.0, drive.pictures_left, drive.deliveries.camera_left);
+    add(1.0, drive.pictures_right, drive.deliveries.camera_right);
   } else {
     for (std::size_t i = 0; i < drive.mag.size(); ++i) {
       const MagSample& s = drive.mag[i];
@@ -91,7 +103,7 @@ TEST_CASE("every fault changes its own sensor, within its time only") {
       if (fault.values[i] == 0.0) fault.values[i] = 0.5;  // an addend of zero would be no fault
     }
     const SimulatedDrive after = drive_with(fault_text(fault));
-    for (const Sensor sensor : {Sensor::kImu, Sensor::kGnss, Sensor::kWheels, Sensor::kMag}) {
+    for (const Sensor sensor : {Sensor::kImu, Sensor::kGnss, Sensor::kWheels, Sensor::kMag, Sensor::kCamera}) {
       const Rows a = rows_of(before, sensor);
       const Rows b = rows_of(after, sensor);
       if (sensor == type.sensor) {
@@ -104,6 +116,39 @@ TEST_CASE("every fault changes its own sensor, within its time only") {
     CHECK(before.truth.size() == after.truth.size());
     CHECK(before.truth.back().T_frame_vehicle.p == after.truth.back().T_frame_vehicle.p);
   }
+}
+
+TEST_CASE("a fault of one eye leaves the other's pictures as they were") {
+  const Rows before = rows_of(simulate(base(), 3), Sensor::kCamera);
+  const auto of_eye = [](const Rows& rows, double eye) {
+    Rows out = rows;
+    for (auto& row : out) std::erase_if(row.second, [eye](const Row& r) { return r[0] != eye; });
+    return out;
+  };
+  CHECK(of_eye(before, 0.0).at(0).size() == 1);
+  for (const FaultType& type : fault_types()) {
+    if (type.sensor != Sensor::kCamera) continue;
+    CAPTURE(type.name);
+    for (const double eye : {0.0, 1.0}) {
+      Fault fault(type, kStart, kDuration);
+      fault.set(eye == 0.0 ? "right" : "left", 0.0);
+      const Rows after = rows_of(drive_with(fault_text(fault)), Sensor::kCamera);
+      CHECK(of_eye(after, eye) != of_eye(before, eye));
+      CHECK(of_eye(after, 1.0 - eye) == of_eye(before, 1.0 - eye));
+    }
+  }
+}
+
+TEST_CASE("both eyes' pictures of one exposure have one stamp") {
+  const SimulatedDrive drive = drive_with("camera.jitter@20+30:sigma_s=0.01");
+  REQUIRE(drive.pictures_left.size() == 801);
+  REQUIRE(drive.pictures_right.size() == 801);
+  int off = 0;
+  for (std::size_t i = 0; i < 801; ++i) {
+    CHECK(drive.pictures_left[i].t_us == drive.pictures_right[i].t_us);
+    off += drive.pictures_left[i].t_us != drive.exposures[i] ? 1 : 0;
+  }
+  CHECK(off > 250);
 }
 
 TEST_CASE("errors and deliveries stay aligned with the samples") {
