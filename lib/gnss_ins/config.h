@@ -113,6 +113,7 @@ struct AlignmentConfig {
   double velocity_std_standing = 0.05;  ///< m/s
   double recovery_s = 10.0;             ///< s of refused fixes, after which the filter and not the receiver is wrong
   int recovery_fixes = 6;
+  double jump_s = 60.0;            ///< s likewise at most, of a receiver that has jumped
   double coasting_s = 3.0;         ///< s without position, velocity or zero velocity: coasting
   double invalid_sigma_m = 100.0;  ///< horizontal; more is no position
 };
@@ -200,6 +201,7 @@ void visit(AlignmentConfig& c, Visitor& v) {
   v.number("velocity_std_standing_mps", c.velocity_std_standing, 1e-3, 10.0);
   v.number("recovery_s", c.recovery_s, 0.1, 1e4);
   v.integer("recovery_fixes", c.recovery_fixes, 1, 1000);
+  v.number("jump_s", c.jump_s, 0.1, 1e4);
   v.number("coasting_s", c.coasting_s, 0.1, 1e4);
   v.number("invalid_sigma_m", c.invalid_sigma_m, 0.1, 1e6);
 }

@@ -16,6 +16,7 @@ constexpr int64_t kDueEarly = 20'000;    // us, so that an interval of whole whe
 constexpr double kWheelsSilent = 0.3;    // s without a wheel speed, after which the constraint keeps its own time
 constexpr double kBridgeRate = 0.2;      // rad/s
 constexpr double kBlindTurn = 0.5;       // s of a gap while moving, after which the heading may be anything
+constexpr double kClipTime = 1.0;        // s that a turn beyond the gyro's range lasts
 constexpr double kMoving = 1.0;          // m/s
 constexpr double kFixSpacing = 0.5;      // s, at least, between the two fixes that a start takes a velocity from
 constexpr double kRecoveryHolds = 60.0;  // s; refused again within, the attitude is wrong as well
@@ -70,7 +71,9 @@ InputStatus GnssIns::advance(const ImuSample& imu) {
 }
 
 void GnssIns::add(const GnssFix& fix, int64_t id) {
-  const AidingStatus screened = screen_.check(fix);
+  const bool again = fix_ && fix.t_us == fix_->t_us && fix.antenna.latitude == fix_->antenna.latitude &&
+                     fix.antenna.longitude == fix_->antenna.longitude && fix.antenna.height == fix_->antenna.height;
+  const AidingStatus screened = again ? AidingStatus::kBadInput : screen_.check(fix);
   if (screened != AidingStatus::kAccepted) {
     AidingRecord r;
     r.t_us = fix.t_us;
@@ -166,9 +169,12 @@ void GnssIns::note(AidingRecord record, int64_t id) {
 }
 
 ImuNoise GnssIns::noise_over(double dt) const {
-  if (dt <= config_.propagation.max_gap && !monitor_.frozen()) return monitor_.noise();
+  ImuNoise noise = monitor_.noise();
   // White noise that over this time does what an unseen manoeuvre may do, (M.18).
-  return {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt)};
+  if (dt > config_.propagation.max_gap || monitor_.frozen())
+    noise = {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt)};
+  if (monitor_.gyro_clipped()) noise.gyro = kBridgeRate * std::sqrt(kClipTime);
+  return noise;
 }
 
 void GnssIns::step(const ImuSample& imu) {
@@ -213,6 +219,8 @@ void GnssIns::align_again() {
   bank_.stop();
   pending_.clear();
   refused_ = 0;
+  agreed_since_us_ = 0;
+  jump_ = JumpJudge();
   forward_stale_ = true;
   lag_us_ = lag_of(prior_age(config_.vehicle));
 }
@@ -273,20 +281,27 @@ void GnssIns::use(const Pending& measured) {
 
 void GnssIns::use_position(const Pending& p) {
   AidingRecord r = applier_.apply(*core_, p, gates_);
-  position_noise_.learn(r);
+  const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
+  // A jump says nothing of the noise.
+  if (!jumped) position_noise_.learn(r);
   if (r.status == AidingStatus::kGated) {
     const AidingRecord level = applier_.apply_level(*core_, p, gates_);
     if (level.status == AidingStatus::kAccepted) r = level;
   }
   if (r.status == AidingStatus::kAccepted) {
+    if (agreed_since_us_ == 0) agreed_since_us_ = p.t_us;
     refused_ = 0;
   } else {
     if (refused_++ == 0) refused_since_us_ = p.t_us;
     const AlignmentConfig& a = config_.alignment;
-    if (refused_ >= a.recovery_fixes && seconds_between(refused_since_us_, p.t_us) >= a.recovery_s) {
+    // The receiver that jumped is held against the filter as long as they agreed before.
+    const double agreed = agreed_since_us_ == 0 ? 0.0 : seconds_between(agreed_since_us_, refused_since_us_);
+    const double patience = jumped ? std::clamp(agreed, a.recovery_s, std::max(a.recovery_s, a.jump_s)) : a.recovery_s;
+    if (refused_ >= a.recovery_fixes && seconds_between(refused_since_us_, p.t_us) >= patience) {
       // Position and velocity were taken from the fixes and do not hold: the heading must be wrong.
       lost_ = recovered_at_us_ != 0 && seconds_between(recovered_at_us_, p.t_us) < kRecoveryHolds;
       recovered_at_us_ = p.t_us;
+      agreed_since_us_ = 0;
       recover(p);
       r.status = AidingStatus::kReset;
     }
@@ -310,6 +325,7 @@ void GnssIns::recover(const Pending& p) {
   reset_delta_.p = after.position - before.position;
   reset_delta_.q = before.q_enu_imu.conjugate() * after.q_enu_imu;
   refused_ = 0;
+  jump_ = JumpJudge();
 }
 
 }  // namespace roadfix

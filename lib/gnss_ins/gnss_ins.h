@@ -15,6 +15,7 @@
 #include "gnss_ins/gnss_screen.h"
 #include "gnss_ins/heading_bank.h"
 #include "gnss_ins/imu_ring.h"
+#include "gnss_ins/jump_judge.h"
 #include "gnss_ins/noise_scale.h"
 
 namespace roadfix {
@@ -115,6 +116,8 @@ class GnssIns {
   int64_t coasting_since_us_ = 0;
   int64_t refused_since_us_ = 0;
   int refused_ = 0;
+  JumpJudge jump_;
+  int64_t agreed_since_us_ = 0;  // first position taken since the last start or recovery
   int64_t recovered_at_us_ = 0;
   bool lost_ = false;  // to be aligned again
   int reset_counter_ = 0;

@@ -61,6 +61,7 @@ void GnssIns::serialise(Archive& a) {
   applier_.serialise(a);
   position_noise_.serialise(a);
   velocity_noise_.serialise(a);
+  jump_.serialise(a);
   monitor_.serialise(a);
   screen_.serialise(a);
   ring_.serialise(a);
@@ -71,8 +72,8 @@ void GnssIns::serialise(Archive& a) {
       a, fix_before_, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });
   a(phase_, lag_us_, last_step_us_, forward_to_, forward_stale_, cov_at_us_, cov_pose_, cov_velocity_,
     next_sideslip_us_, next_heave_us_, last_mag_us_, last_wheel_us_, wheels_at_us_, coasting_since_us_,
-    refused_since_us_, refused_, recovered_at_us_, lost_, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
-    bad_imu_, gaps_);
+    refused_since_us_, refused_, agreed_since_us_, recovered_at_us_, lost_, reset_counter_, reset_delta_.p,
+    reset_delta_.q.coeffs(), bad_imu_, gaps_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

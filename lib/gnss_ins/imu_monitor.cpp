@@ -45,6 +45,8 @@ ImuNoise NoiseBand::density() const { return {std::sqrt(gyro_), std::sqrt(accel_
 
 bool ImuMonitor::add(const ImuSample& imu, double dt) {
   repeats_ = imu.gyro == last_.gyro && imu.accel == last_.accel ? repeats_ + 1 : 0;
+  for (int i = 0; i < 3; ++i)
+    clipped_(i) = imu.gyro(i) == last_.gyro(i) && std::abs(imu.gyro(i)) > kClippedRate ? clipped_(i) + 1 : 0;
   last_ = imu;
   for (NoiseBand& band : bands_) band.add(imu, dt);
 

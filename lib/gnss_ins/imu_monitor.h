@@ -57,17 +57,23 @@ class ImuMonitor {
   /// Identical readings for longer than a sensor with noise can give.
   [[nodiscard]] bool frozen() const { return repeats_ >= kFrozenSamples; }
 
+  /// One axis of the gyro stays at the very same rate while it turns: the end of its range.
+  [[nodiscard]] bool gyro_clipped() const { return clipped_.maxCoeff() >= kClippedSamples; }
+
   template <class Archive>
   void serialise(Archive& a);
 
  private:
   static constexpr int kQuarters = 4;
   static constexpr int kFrozenSamples = 20;
+  static constexpr int kClippedSamples = 8;
+  static constexpr double kClippedRate = 0.05;  // rad/s, slower is no end of a range
   void finish_block(int64_t t_us);
 
   double spec_gyro_, spec_accel_, factor_, block_s_;
   ImuSample last_;
   int repeats_ = 0;
+  Eigen::Vector3i clipped_ = Eigen::Vector3i::Zero();  // samples in a row, by axis
   std::array<NoiseBand, 3> bands_{NoiseBand(1), NoiseBand(4), NoiseBand(16)};
   Eigen::Matrix<double, 6, kQuarters> sums_ = Eigen::Matrix<double, 6, kQuarters>::Zero();
   Eigen::Vector4d times_ = Eigen::Vector4d::Zero();
@@ -76,8 +82,8 @@ class ImuMonitor {
 
 template <class Archive>
 void ImuMonitor::serialise(Archive& a) {
-  a(last_.t_us, last_.gyro, last_.accel, repeats_, sums_, times_, block_.end_us, block_.duration, block_.gyro,
-    block_.accel, block_.gyro_wander, block_.accel_wander);
+  a(last_.t_us, last_.gyro, last_.accel, repeats_, clipped_.x(), clipped_.y(), clipped_.z(), sums_, times_,
+    block_.end_us, block_.duration, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander);
   for (NoiseBand& band : bands_) band.serialise(a);
 }
 

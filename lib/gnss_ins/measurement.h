@@ -80,16 +80,23 @@ struct Innovation {
     const Eigen::Matrix<double, Rows, 1> whitened = S.matrixL().solve(m.residual);
     const Eigen::Matrix<double, Rows, kStates> Yt = S.matrixL().solve(PHt.transpose());
     const Eigen::Matrix<double, kStates, Rows> Y = Yt.transpose();
-    const ErrorMatrix before = P;
-    for (int j = 0; j < kStates; ++j)
-      for (int k = 0; k < Rows; ++k) P.col(j) -= Y.col(k) * Y(j, k);
     ErrorVector dx = Y * whitened;
-    if (considered.size > 0) {
+    if (considered.size == 0) {
+      subtract(P, Y);
+    } else {
+      const ErrorMatrix before = P;
+      subtract(P, Y);
       dx.segment(considered.first, considered.size).setZero();
       P.block(considered.first, considered.first, considered.size, considered.size) =
           before.block(considered.first, considered.first, considered.size, considered.size);
     }
     x = retract(x, dx);
+  }
+
+ private:
+  static void subtract(ErrorMatrix& P, const Eigen::Matrix<double, kStates, Rows>& Y) {
+    for (int j = 0; j < kStates; ++j)
+      for (int k = 0; k < Rows; ++k) P.col(j) -= Y.col(k) * Y(j, k);
   }
 };
 
