@@ -52,6 +52,7 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
   restart_ = add("VO_RESTART", "vo_restart_t", kFeedback_us);
   if (stereo_) spec_.clocks.push_back({kRight, kCameraLost_us});
   spec_.clocks.push_back({kLeft, kCameraLost_us});
+  spec_.overload.inputs = stereo_ ? std::vector<int>{kLeft, kRight} : std::vector<int>{kLeft};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
 }
 
