@@ -17,6 +17,7 @@ enum class VoMode { kKeyframe };
 struct VoTrackerConfig {
   VoMode mode = VoMode::kKeyframe;
   int threads = 2;               ///< 2: bundle adjustment runs beside the tracking; the results are the same
+  bool filter_stamps = false;    ///< the left camera's stamps are put on a line at the device's rate
   double stereo_gap = 0.005;     ///< s, largest difference of the stamps of a stereo pair
   std::string superpoint_model;  ///< an ONNX file, relative to the configuration's folder; for front end superpoint
   KeyframeTrackerConfig keyframe;
@@ -26,6 +27,7 @@ template <class Visitor>
 void visit(VoTrackerConfig& c, Visitor& v) {
   v.choice("mode", c.mode, {{"keyframe", VoMode::kKeyframe}});
   v.integer("threads", c.threads, 1, 2);
+  v.boolean("filter_stamps", c.filter_stamps);
   v.number("stereo_gap_s", c.stereo_gap, 0.0, 0.1);
   v.text("superpoint_model", c.superpoint_model);
   v.group("keyframe", c.keyframe);
