@@ -29,7 +29,8 @@ struct KeyframeTrackerConfig {
   double focal_std = 0.01;           ///< relative
   double radial_std = 0.02;          ///< coefficient of r^2 left over
   double right_turn_std_deg = 0.05;  ///< of the right eye against the left
-  /// Sightings of a track whose errors are alike, so that they count as one in every covariance.
+  /// Sightings that count as one where the calibration is learnt: a prior must not drown in sightings whose errors are
+  /// alike. Poses' covariances do not use it: they take the errors' likeness from the errors themselves, (M.16).
   double alike_sightings = 30.0;
   // Keyframes.
   double keyframe_flow_px = 20.0;    ///< mean motion of tracks since the last keyframe that asks for a new one
@@ -45,6 +46,9 @@ struct KeyframeTrackerConfig {
   double start_flow_px = 15.0;  ///< median motion since the first picture
   int start_points = 60;        ///< points that the first two keyframes must agree on
   ScaleChoice scale = ScaleChoice::kAuto;
+  // Places.
+  bool close_loops = true;  ///< remember places, know them again, close loops and find back after a loss
+  int max_places = 1000;    ///< remembered, about one in 5 m
   // Trust.
   int min_inliers = 15;       ///< fewer: no pose
   int weak_inliers = 35;      ///< fewer: weak
@@ -78,6 +82,8 @@ void visit(KeyframeTrackerConfig& c, Visitor& v) {
             {"wheels", ScaleChoice::kWheels},
             {"ins", ScaleChoice::kIns},
             {"none", ScaleChoice::kNone}});
+  v.boolean("close_loops", c.close_loops);
+  v.integer("max_places", c.max_places, 10, 100000);
   v.integer("min_inliers", c.min_inliers, 6, 1000);
   v.integer("weak_inliers", c.weak_inliers, 6, 1000);
   v.number("weak_ratio", c.weak_ratio, 0.0, 1.0);

@@ -25,13 +25,19 @@ void KeyframeTracker::begin_map(int64_t t_us) {
     const double unseen_s = seconds_between(*t_good_us_, t_us);
     const double unseen =
         motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s * unseen_s : 0.0;
-    cov_keyframe_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
+    if (!found_back_) {
+      cov_keyframe_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
+      cov_closed_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
+      out_.reset_delta = SE3{};
+    }
     ++out_.reset_counter;
-    out_.reset_delta = SE3{};
+    ++out_.closed_reset_counter;
+    out_.closed_reset_delta = out_.reset_delta;
   }
   motion_.reset();
-  out_.state = TrackState::kGood;
-  out_.reason.clear();
+  out_.state = found_back_ ? TrackState::kRelocalised : TrackState::kGood;
+  out_.reason = found_back_ ? "found back at a place seen before" : "";
+  found_back_ = false;
   out_.num_inliers = landmarks_at_keyframe_;
   accept(t_us, map_.last().T_map_camera, Matrix6d::Zero());
   motion_.reset();
@@ -47,6 +53,7 @@ int KeyframeTracker::count_landmarks(const std::vector<KeyframeFeature>& feature
 }
 
 void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Feature>& features) {
+  find_back(frame);
   start_ = Start{};
   start_->t_us = frame.t_us;
   std::vector<Feature> all = features;

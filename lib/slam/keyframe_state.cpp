@@ -39,6 +39,7 @@ void KeyframeTracker::restart(const Restart& restart) {
   forget_map();
   restart_ = restart;
   restarted_ = true;
+  continuous_ = found_back_ = false;
 }
 
 /// The first frame after a restart: the vehicle has moved on from the pose given.
@@ -63,6 +64,9 @@ void KeyframeTracker::arrive(int64_t t_us) {
   F.topRightCorner<3, 3>() = -T_local_vehicle.R() * skew(rig_.T_vehicle_left.p);
   F.bottomRightCorner<3, 3>() = rig_.T_vehicle_left.R().transpose();
   cov_keyframe_ = F * cov * F.transpose();
+  cov_closed_ = cov_keyframe_;
+  ++out_.closed_reset_counter;
+  out_.closed_reset_delta = out_.reset_delta;
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
   motion_ = Motion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
   t_good_us_.reset();
@@ -132,7 +136,7 @@ void KeyframeTracker::take_scale() {
 Odometry KeyframeTracker::at(int64_t t_us) const {
   Odometry o = out_.odometry;
   o.t_us = t_us;
-  if (!t_us_ || t_us <= *t_us_ || o.validity == Validity::kInvalid) return o;
+  if (!t_us_ || t_us == *t_us_ || o.validity == Validity::kInvalid) return o;
   const double dt_s = seconds_between(*t_us_, t_us);
   if (dt_s > config_.lost_after_s) {
     o.validity = Validity::kInvalid;
@@ -144,7 +148,6 @@ Odometry KeyframeTracker::at(int64_t t_us) const {
   o.cov_pose.topLeftCorner<3, 3>() +=
       dt_s * dt_s * o.T_frame_vehicle.R() * o.cov_velocity * o.T_frame_vehicle.R().transpose();
   o.cov_pose.topLeftCorner<3, 3>().diagonal().array() += slip * slip;
-  o.validity = Validity::kCoasting;
   return o;
 }
 
@@ -152,6 +155,8 @@ void KeyframeTracker::digest(Digest& digest) const {
   digest.add(T_map_camera_.q.coeffs());
   digest.add(T_map_camera_.p);
   digest.add(cov_keyframe_);
+  digest.add(loops_.S_map_odom().p);
+  digest.add(loops_.S_map_odom().q.coeffs());
   digest.add(map_.lens().value);
   digest.add(map_.num_keyframes_ever());
 }
@@ -195,6 +200,12 @@ void KeyframeTracker::save(StateWriter& writer) const {
   }
   writer.put(landmarks_at_keyframe_);
   writer.put(cov_keyframe_);
+  writer.put(cov_closed_);
+  writer.put(continuous_);
+  writer.put(found_back_);
+  writer.put(out_.closed_reset_counter);
+  put_pose(out_.closed_reset_delta, writer);
+  loops_.save(writer);
   wheels_.save(writer);
   ins_.save(writer);
   writer.put(static_cast<int64_t>(new_speeds_.size()));
@@ -247,6 +258,12 @@ void KeyframeTracker::load(StateReader& reader) {
   for (auto left = reader.get<int64_t>(); left > 0; --left) reader.get(pixels_[reader.get<int64_t>()]);
   reader.get(landmarks_at_keyframe_);
   reader.get(cov_keyframe_);
+  reader.get(cov_closed_);
+  reader.get(continuous_);
+  reader.get(found_back_);
+  reader.get(out_.closed_reset_counter);
+  get_pose(out_.closed_reset_delta, reader);
+  loops_.load(reader);
   wheels_.load(reader);
   ins_.load(reader);
   for (auto left = reader.get<int64_t>(); left > 0; --left) new_speeds_.push_back(get_speed(reader));

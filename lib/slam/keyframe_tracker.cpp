@@ -52,6 +52,25 @@ KeyframeTrackerConfig fitted(KeyframeTrackerConfig config) {
   return config;
 }
 
+/// Covariance of a pose after the change of axes S.
+Matrix6d in_map(const Matrix6d& cov, const Sim3& S) {
+  Matrix6d F = Matrix6d::Identity();
+  F.topLeftCorner<3, 3>() = S.scale * S.q.toRotationMatrix();
+  return F * cov * F.transpose();
+}
+
+LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRig& rig) {
+  // Corners at whole pixels, seen from another place.
+  constexpr double kSigma_px = 1.0, kGate_px = 4.0;
+  LoopCloserConfig loops;
+  loops.pose.focal_px = Camera(rig.left).focal();
+  loops.pose.sigma_px = kSigma_px;
+  loops.pose.gate_px = kGate_px;
+  loops.with_scale = !rig.right;
+  loops.max_places = config.max_places;
+  return loops;
+}
+
 }  // namespace
 
 KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig,
@@ -63,7 +82,8 @@ KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const Came
       front_end_(std::move(front_end)),
       executor_(executor),
       map_(rig, config_),
-      T_map_camera_(rig.T_vehicle_left) {
+      T_map_camera_(rig.T_vehicle_left),
+      loops_(loop_config(config_, rig)) {
   if (!rig.right) return;
   stereo_ = std::move(right_finder);
   if (!stereo_) {
@@ -80,6 +100,8 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   TrackedFrame fresh;
   fresh.reset_counter = out_.reset_counter;
   fresh.reset_delta = out_.reset_delta;
+  fresh.closed_reset_counter = out_.closed_reset_counter;
+  fresh.closed_reset_delta = out_.closed_reset_delta;
   fresh.odometry.t_us = frame.t_us;
   out_ = std::move(fresh);
   if (restarted_) arrive(frame.t_us);
@@ -89,6 +111,7 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
     take_scale();
     follow(frame);
   } else if (stereo_ && !frame.right.empty()) {
+    find_back(frame);
     start_stereo(frame);
   } else {
     start_mono(frame);
@@ -98,6 +121,7 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   out_.scale_std = scale_std_;
   out_.num_keyframes = map_.num_keyframes_ever();
   out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
+  out_.num_loops = loops_.num_loops();
   return out_;
 }
 
@@ -194,7 +218,7 @@ bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_p
                     solution->num_inliers < config_.weak_ratio * static_cast<double>(points.size());
   out_.state = weak ? TrackState::kWeak : TrackState::kGood;
   if (weak) out_.reason = "few landmarks agree with the pose";
-  accept(out_.odometry.t_us, solution->T_map_camera, config_.alike_sightings * solution->cov);
+  accept(out_.odometry.t_us, solution->T_map_camera, solution->cov);
   return true;
 }
 
@@ -208,6 +232,10 @@ void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix
   Odometry& o = out_.odometry;
   o.T_frame_vehicle = T_map_camera * T_camera_vehicle;
   o.cov_pose = vehicle_covariance(cov, T_map_camera, T_camera_vehicle);
+  const Sim3& S_map_odom = loops_.S_map_odom();
+  const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
+  const Matrix6d cov_closed = carried(cov_closed_, T_closed_keyframe, T_keyframe_now) + in_map(cov_camera, S_map_odom);
+  out_.cov_closed = vehicle_covariance(cov_closed, S_map_odom.rigid() * T_map_camera, T_camera_vehicle);
   o.validity = Validity::kValid;
   if (motion_ && motion_->dt_s > 0.0) {
     const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * T_camera_vehicle;
@@ -286,11 +314,14 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
   const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}};
   if (!map_.empty()) {
     const SE3& T_map_before = map_.last().T_map_camera;
-    cov_keyframe_ = carried(cov_keyframe_, T_map_before, T_map_before.inverse() * T_map_camera_);
+    const SE3 T_before_now = T_map_before.inverse() * T_map_camera_;
+    cov_keyframe_ = carried(cov_keyframe_, T_map_before, T_before_now);
+    cov_closed_ = carried(cov_closed_, loops_.S_map_odom().rigid() * T_map_before, T_before_now);
   }
   map_.add_keyframe(keyframe, seen);
   landmarks_at_keyframe_ = count_landmarks(seen);
   begin_bundle();
+  remember_place(frame, all);
 }
 
 void KeyframeTracker::begin_bundle() {
@@ -311,7 +342,9 @@ void KeyframeTracker::finish_bundle() {
   for (const int64_t track : wrong) pixels_.erase(track);
   T_map_camera_ = map_.last().T_map_camera;  // the frame before this one was the job's last keyframe
   const auto steps = static_cast<double>(std::max<size_t>(1, job_->keyframes.size() - 1));
-  cov_keyframe_ += (config_.alike_sightings / steps) * job_->report.cov_last;
+  const Matrix6d grown = job_->report.clustered_cov_last / steps;
+  cov_keyframe_ += grown;
+  cov_closed_ += in_map(grown, loops_.S_map_odom());
   job_.reset();
 }
 

@@ -17,6 +17,7 @@
 #include "slam/config.h"
 #include "slam/executor.h"
 #include "slam/local_map.h"
+#include "slam/loop_closer.h"
 #include "slam/pose_solver.h"
 #include "slam/travel.h"
 #include "stream/digest.h"
@@ -44,9 +45,13 @@ struct TrackedFrame {
   TrackState state = TrackState::kInitialising;
   std::string reason;  ///< plain words, empty when good
   ScaleSource scale = ScaleSource::kNone;
-  double scale_std = 0.0;  ///< relative, common to the whole way; meaningless where the source is none
-  int reset_counter = 0;   ///< +1 per jump of the pose
-  SE3 reset_delta;         ///< of the last jump: p is new minus old, q is q_old^-1 q_new
+  double scale_std = 0.0;                  ///< relative, common to the whole way; meaningless where the source is none
+  int reset_counter = 0;                   ///< +1 per jump of the pose
+  SE3 reset_delta;                         ///< of the last jump: p is new minus old, q is q_old^-1 q_new
+  Matrix6d cov_closed = Matrix6d::Zero();  ///< of the pose with all loops closed
+  int closed_reset_counter = 0;            ///< of that pose: it jumps where a loop is closed, odometry does not
+  SE3 closed_reset_delta;
+  int num_loops = 0;
   std::vector<UsedFeature> features;
   int num_expected = 0;  ///< tracks looked for
   int num_matches = 0;   ///< tracks found again
@@ -86,8 +91,10 @@ class KeyframeTracker {
   const TrackedFrame& process(const CameraFrame& frame);
 
   [[nodiscard]] const TrackedFrame& last() const { return out_; }
-  /// The last frame's pose carried on to a later time by the last motion; coasting where that is later.
+  /// The last frame's pose carried to another time by the last motion; invalid where that is long after it.
   [[nodiscard]] Odometry at(int64_t t_us) const;
+  /// The same pose with all loops closed.
+  [[nodiscard]] Odometry closed(Odometry odometry) const;
 
   /// Everything that later frames depend on. To be called between two frames; after load() the same frames give the
   /// same bits. load() throws where the bytes are no such state.
@@ -143,6 +150,9 @@ class KeyframeTracker {
   void drop_wrong_tracks(const std::vector<Feature>& features);
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
   void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features);
+  void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);
+  void find_back(const CameraFrame& frame);
+  [[nodiscard]] PlaceView view_of(const cv::Mat& gray, const std::vector<Feature>& features, int64_t t_us) const;
   void miss(int64_t t_us, const std::string& reason);
   void accept(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera);
 
@@ -163,6 +173,10 @@ class KeyframeTracker {
   std::map<int64_t, Eigen::Vector2f> pixels_;  ///< of the live tracks in the last picture
   int landmarks_at_keyframe_ = 0;
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
+  Matrix6d cov_closed_ = Matrix6d::Zero();    ///< the same of the pose with all loops closed
+  LoopCloser loops_;
+  bool continuous_ = false;  ///< no jump since the last place
+  bool found_back_ = false;  ///< the next map begins at a place known from before
   std::vector<SpeedSample> new_speeds_;
   TravelHistory wheels_, ins_;
   ScaleSource scale_ = ScaleSource::kNone;  ///< of the map

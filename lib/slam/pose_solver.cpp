@@ -59,7 +59,9 @@ void judge(std::span<const PosePoint> points, const PoseSolverConfig& config, Po
   }
   if (solution.num_inliers == 0) return;
   solution.rms_px = std::sqrt(sum / (2.0 * solution.num_inliers));
-  solution.cov = H.ldlt().solve(Matrix6d::Identity());
+  const double errors = std::max(1.0, 2.0 * solution.num_inliers - 6.0);  // the fit took six
+  solution.cov =
+      sum / (errors * config.focal_px * config.focal_px) * scale * scale * H.ldlt().solve(Matrix6d::Identity());
 }
 
 }  // namespace

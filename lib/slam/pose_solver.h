@@ -25,8 +25,9 @@ struct PoseSolverConfig {
 
 struct PoseSolution {
   SE3 T_map_camera;
-  Matrix6d cov = Matrix6d::Zero();  ///< of retract(T_map_camera, d), for points known exactly
-  std::vector<bool> inlier;         ///< one per point
+  /// Of retract(T_map_camera, d), for points known exactly: from the errors seen, (M.7).
+  Matrix6d cov = Matrix6d::Zero();
+  std::vector<bool> inlier;  ///< one per point
   int num_inliers = 0;
   double rms_px = 0.0;  ///< of the inliers, per image coordinate
 };

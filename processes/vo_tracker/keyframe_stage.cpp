@@ -16,7 +16,7 @@ namespace roadfix {
 namespace {
 
 constexpr int kLeft = 0, kRight = 1;
-enum Output { kPose = 0, kStatus = 1, kFeatures = 2 };
+enum Output { kPose = 0, kStatus = 1, kFeatures = 2, kClosed = 3 };
 
 constexpr int64_t kFeedback_us = 500'000;    // DESIGN.md, section 4
 constexpr int64_t kWheels_us = 50'000;       // the lateness of WHEELS there
@@ -35,7 +35,8 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
       config_(config),
       superpoint_weights_(superpoint_weights),
       stereo_(calibration.sensors.camera_right.has_value()),
-      executor_(make_executor(config.threads)) {
+      executor_(make_executor(config.threads)),
+      stamps_(calibration.sensors.camera_left ? calibration.sensors.camera_left->rate : std::nullopt) {
   fix_opencv_threads();
   tracker_ =
       std::make_unique<KeyframeTracker>(config.keyframe, camera_rig(calibration),
@@ -53,7 +54,8 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
   if (stereo_) spec_.clocks.push_back({kRight, kCameraLost_us});
   spec_.clocks.push_back({kLeft, kCameraLost_us});
   spec_.overload.inputs = stereo_ ? std::vector<int>{kLeft, kRight} : std::vector<int>{kLeft};
-  spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
+  spec_.outputs = {
+      {"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}, {"POSE_VO_MAP", "pose_t"}};
 }
 
 KeyframeStage::~KeyframeStage() = default;
@@ -76,7 +78,8 @@ void KeyframeStage::apply(const Message& m) {
   }
 }
 
-void KeyframeStage::track(const CameraFrame& frame) {
+void KeyframeStage::track(CameraFrame& frame) {
+  if (config_.filter_stamps) frame.t_us = stamps_.filter(frame.t_us);
   tracker_->process(frame);
   tracked_ = true;
   left_.reset();
@@ -86,8 +89,12 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   if (left_) track(*left_);
   const TrackedFrame& frame = tracker_->last();
   const BodyOrigin origin = calibration_.body_origin.value_or(BodyOrigin::kImu);
-  pose_t pose = vo_pose(frame, tracker_->at(now_utime), origin);
+  Odometry odometry = tracker_->at(now_utime);
+  if (!tracked_ && odometry.validity == Validity::kValid) odometry.validity = Validity::kCoasting;
+  pose_t pose = vo_pose(frame, odometry, origin);
   outputs.publish(kPose, pose);
+  pose_t closed = vo_closed_pose(frame, tracker_->closed(odometry), origin);
+  outputs.publish(kClosed, closed);
   if (!tracked_) return;  // a tick without a left picture: nothing new to say but the pose carried on
   tracked_ = false;
   vo_status_t status = vo_status(frame, config_.keyframe.front_end.kind);
@@ -100,6 +107,7 @@ void KeyframeStage::digest(Digest& digest) const { tracker_->digest(digest); }
 
 std::vector<uint8_t> KeyframeStage::save() const {
   StateWriter writer;
+  stamps_.save(writer);
   tracker_->save(writer);
   return writer.take();
 }
@@ -109,9 +117,12 @@ void KeyframeStage::load(std::span<const uint8_t> state) {
       std::make_unique<KeyframeTracker>(config_.keyframe, camera_rig(calibration_),
                                         make_front_end(config_.keyframe.front_end, superpoint_weights_), *executor_);
   StateReader reader(state);
+  StampFilter stamps = stamps_;
+  stamps.load(reader);
   loaded->load(reader);
   reader.finish();
   tracker_ = std::move(loaded);
+  stamps_ = stamps;
   left_.reset();
   tracked_ = false;
 }

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "bus/stage.h"
+#include "camera/stamp_filter.h"
 #include "vo_tracker/handler.h"
 #include "vo_tracker/thread_executor.h"
 
@@ -32,7 +33,7 @@ class KeyframeStage final : public Stage {
   [[nodiscard]] std::string effective_calibration() const override;
 
  private:
-  void track(const CameraFrame& frame);
+  void track(CameraFrame& frame);
 
   Calibration calibration_;
   VoTrackerConfig config_;
@@ -43,7 +44,8 @@ class KeyframeStage final : public Stage {
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<KeyframeTracker> tracker_;
   std::unique_ptr<CameraFrame> left_;  ///< waits for its right picture until the tick's end
-  bool tracked_ = false;               ///< a frame since the last publish
+  StampFilter stamps_;
+  bool tracked_ = false;  ///< a frame since the last publish
 };
 
 }  // namespace roadfix

@@ -49,6 +49,15 @@ const char* name_of(FrontEndKind kind) {
   return "klt";
 }
 
+void set_reset(int counter, const SE3& delta, pose_t& m) {
+  m.reset_counter = counter;
+  for (int i = 0; i < 3; ++i) m.reset_delta_m[i] = delta.p(i);
+  m.reset_delta_q_wxyz[0] = delta.q.w();
+  m.reset_delta_q_wxyz[1] = delta.q.x();
+  m.reset_delta_q_wxyz[2] = delta.q.y();
+  m.reset_delta_q_wxyz[3] = delta.q.z();
+}
+
 }  // namespace
 
 pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin) {
@@ -59,13 +68,13 @@ pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin o
   m.scale = frame.scale == ScaleSource::kNone ? pose_t::SCALE_UNKNOWN : pose_t::SCALE_METRIC;
   m.state = pose_state(frame.state);
   m.reason = frame.reason;
-  m.reset_counter = frame.reset_counter;
-  for (int i = 0; i < 3; ++i) m.reset_delta_m[i] = frame.reset_delta.p(i);
-  const Eigen::Quaterniond& q = frame.reset_delta.q;
-  m.reset_delta_q_wxyz[0] = q.w();
-  m.reset_delta_q_wxyz[1] = q.x();
-  m.reset_delta_q_wxyz[2] = q.y();
-  m.reset_delta_q_wxyz[3] = q.z();
+  set_reset(frame.reset_counter, frame.reset_delta, m);
+  return m;
+}
+
+pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOrigin origin) {
+  pose_t m = vo_pose(frame, closed, origin);
+  set_reset(frame.closed_reset_counter, frame.closed_reset_delta, m);
   return m;
 }
 
@@ -87,6 +96,7 @@ vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end) {
   m.brightness = frame.brightness;
   m.num_keyframes = static_cast<int32_t>(frame.num_keyframes);
   m.num_map_points = static_cast<int32_t>(frame.num_landmarks);
+  m.num_loops_closed = frame.num_loops;
   return m;
 }
 

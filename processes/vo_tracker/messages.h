@@ -12,6 +12,8 @@
 namespace roadfix {
 
 pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin);
+/// The pose with all loops closed, with resets of its own.
+pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOrigin origin);
 vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end);
 vo_features_t vo_features(const TrackedFrame& frame);
 

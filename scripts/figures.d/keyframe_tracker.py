@@ -52,13 +52,13 @@ def malaga(runs):
 
 
 def malaga_tracked(runs):
-    availability = malaga(runs)["availability"]
-    return availability["valid"]
+    """Share of the time that is scored (5 s after the drive's begin) with a valid pose."""
+    return malaga(runs)["availability"]["valid"]
 
 
 def malaga_shape_pct(runs):
     figures = malaga(runs)
-    return 100.0 * figures["errors"]["norm_m"]["rmse"] / figures["path_length_m"]
+    return 100.0 * figures["ate_rmse_m"] / figures["distance_m"]
 
 
 def nees_lines(runs):

@@ -90,6 +90,9 @@ struct Setter {
   void integer(const char* name, int& x, int, int) {
     if (name == key) x = std::stoi(text), done = true;
   }
+  void boolean(const char* name, bool& x) {
+    if (name == key) x = text == "true", done = true;
+  }
   template <class T>
   void choice(const char* name, T& x, std::initializer_list<std::pair<const char*, T>> values) {
     for (const auto& [word, value] : values) {

@@ -166,6 +166,10 @@ TEST_CASE("a pose, a status and the features come with every frame, for now") {
   CHECK(std::abs(last.velocity_mps[0]) < 0.1);
   CHECK(poses[40].velocity_mps[0] == Approx(8.0).epsilon(0.05));
   CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
+  const auto closed = out.all<pose_t>("POSE_VO_MAP");  // no loop on a straight way: the same pose
+  REQUIRE(closed.size() == kFrames);
+  CHECK(closed.back().position_m[0] == Approx(last.position_m[0]).margin(0.01));
+  CHECK(statuses.back().num_loops_closed == closed.back().reset_counter);
   CHECK(statuses.back().front_end == "klt");
   CHECK(statuses.back().scale_source == vo_status_t::SCALE_FROM_STEREO);
   CHECK(statuses.back().inlier_ratio > 0.8);

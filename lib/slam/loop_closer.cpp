@@ -1,0 +1,270 @@
+#include "slam/loop_closer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "features/keypoints.h"
+#include "geometry/so3.h"
+#include "slam/state_io.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int64_t kRecent = 20;      ///< places just left: seeing them is no loop
+constexpr size_t kCandidates = 4;    ///< whose geometry is tried
+constexpr size_t kMaxPoints = 160;   ///< kept of one place
+constexpr double kMaxDistance = 55;  ///< bits
+constexpr double kRatio = 0.85;      ///< best over second best
+constexpr int kMinMatches = 25;
+constexpr int kMinInliers = 20;
+constexpr double kMinInlierShare = 0.4;
+constexpr int kMinScalePairs = 8;
+
+// What ties along the way may have wrong, for the share that each takes of a loop's error: the ratio counts, not the
+// size. One percent of the way, and the turn that half a pixel makes at 700 pixels of focal length.
+constexpr double kWayShare = 0.01;
+constexpr double kLeastWay = 0.01;     // m
+constexpr double kTurn = 0.0007;       // rad
+constexpr double kScaleDrift = 0.003;  // per tie
+constexpr double kBreak = 10.0;        // m, where the odometry jumped
+constexpr double kBreakTurn = 0.3;     // rad
+constexpr double kLoopTurn = 0.003;    // rad, at least
+constexpr double kLoopWay = 0.05;      // m, at least
+constexpr double kLoopScale = 0.02;
+
+struct Pair {
+  int view = 0, place = 0;
+};
+
+/// Nearest neighbours both ways, clearly nearer than the next.
+std::vector<Pair> match(const cv::Mat& view, const cv::Mat& place) {
+  std::vector<int> best_view(static_cast<size_t>(place.rows), -1);
+  std::vector<double> best_distance(static_cast<size_t>(place.rows), std::numeric_limits<double>::infinity());
+  std::vector<Pair> pairs;
+  for (int v = 0; v < view.rows; ++v) {
+    double first = std::numeric_limits<double>::infinity(), second = first;
+    int nearest = -1;
+    for (int p = 0; p < place.rows; ++p) {
+      const double distance = descriptor_distance(view, v, place, p);
+      if (distance < first) {
+        second = first;
+        first = distance;
+        nearest = p;
+      } else {
+        second = std::min(second, distance);
+      }
+    }
+    if (nearest < 0 || first > kMaxDistance || first > kRatio * second) continue;
+    const auto n = static_cast<size_t>(nearest);
+    if (first < best_distance[n]) {
+      best_distance[n] = first;
+      best_view[n] = v;
+    }
+  }
+  for (int p = 0; p < place.rows; ++p) {
+    if (best_view[static_cast<size_t>(p)] >= 0) pairs.push_back({best_view[static_cast<size_t>(p)], p});
+  }
+  return pairs;
+}
+
+}  // namespace
+
+std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view, size_t index) const {
+  const Place& place = places_[index];
+  const std::vector<Pair> pairs = match(view.descriptors, place.descriptors);
+  if (static_cast<int>(pairs.size()) < kMinMatches) return std::nullopt;
+  std::vector<PosePoint> points;
+  for (const Pair& pair : pairs) {
+    points.push_back({place.points[static_cast<size_t>(pair.place)].cast<double>(),
+                      view.normalised[static_cast<size_t>(pair.view)]});
+  }
+  PoseSolverConfig config = config_.pose;
+  config.min_inliers = kMinInliers;
+  auto solution = search_pose(points, config);
+  if (!solution || solution->num_inliers < kMinInlierShare * static_cast<double>(pairs.size())) return std::nullopt;
+  Recognition found{index, std::move(*solution), 1.0};
+  if (!config_.with_scale) return found;
+  std::vector<double> ratios;  // lengths in the place's map over lengths in the camera's
+  const SE3 T_camera_place = found.solution.T_map_camera.inverse();
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    const auto& own = view.p_camera[static_cast<size_t>(pairs[i].view)];
+    if (!found.solution.inlier[i] || !own) continue;
+    ratios.push_back((T_camera_place * points[i].p_map).z() / own->z());
+  }
+  if (static_cast<int>(ratios.size()) < kMinScalePairs) return std::nullopt;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  found.scale = *middle;
+  if (!(found.scale > 0.2 && found.scale < 5.0)) return std::nullopt;
+  return found;
+}
+
+std::optional<LoopCloser::Recognition> LoopCloser::recognise(const PlaceView& view, int64_t newest) const {
+  if (places_.empty() || view.descriptors.empty()) return std::nullopt;
+  std::optional<Recognition> best;
+  for (const auto& candidate : index_.look_up(view.descriptors, newest, kCandidates)) {
+    auto found = verify(view, static_cast<size_t>(candidate.place - places_.front().id));
+    if (found && (!best || found->solution.num_inliers > best->solution.num_inliers)) best = std::move(found);
+  }
+  return best;
+}
+
+std::optional<SE3> LoopCloser::locate(const PlaceView& view) const {
+  const auto found = recognise(view, next_id_ - 1);
+  if (!found) return std::nullopt;
+  const Sim3 S_place_camera{found->solution.T_map_camera.q, found->solution.T_map_camera.p, 1.0};
+  return (S_map_odom_.inverse() * places_[found->place].S_map_camera * S_place_camera).rigid();
+}
+
+void LoopCloser::remember(const PlaceView& view) {
+  Place place;
+  place.id = next_id_++;
+  place.cov = view.cov;
+  place.S_map_camera = S_map_odom_ * Sim3{view.T_odom_camera.q, view.T_odom_camera.p, 1.0};
+  for (size_t i = 0; i < view.p_camera.size() && place.points.size() < kMaxPoints; ++i) {
+    if (!view.p_camera[i]) continue;
+    place.points.emplace_back(view.p_camera[i]->cast<float>());
+    place.descriptors.push_back(view.descriptors.row(static_cast<int>(i)));
+  }
+  index_.add(place.id, place.descriptors);
+  places_.push_back(std::move(place));
+  if (static_cast<int>(places_.size()) > config_.max_places) forget_oldest();
+}
+
+void LoopCloser::forget_oldest() {
+  places_.pop_front();
+  way_.pop_front();
+  const int64_t first = places_.front().id;
+  std::erase_if(loops_, [first](const PoseTie& tie) { return tie.a < first || tie.b < first; });
+  index_.forget_before(first);
+}
+
+bool LoopCloser::visit(const PlaceView& view, bool continuous) {
+  const auto found = recognise(view, next_id_ - kRecent);
+  const int64_t id = next_id_;
+  if (!places_.empty()) {
+    PoseTie tie;
+    tie.a = static_cast<int>(id - 1);
+    tie.b = static_cast<int>(id);
+    const SE3 T = T_odom_last_.inverse() * view.T_odom_camera;
+    tie.S_a_b = {T.q, T.p, 1.0};
+    const double way = T.p.norm();
+    tie.sigma << Eigen::Vector3d::Constant(continuous ? kLeastWay + kWayShare * way : kBreak),
+        Eigen::Vector3d::Constant(continuous ? kTurn : kBreakTurn), kScaleDrift;
+    way_.push_back(tie);
+  }
+  const std::optional<size_t> known = found ? std::optional(found->place) : std::nullopt;
+  const int64_t known_id = known ? places_[*known].id : -1;
+  remember(view);
+  T_odom_last_ = view.T_odom_camera;
+  if (!known || known_id < places_.front().id) return false;
+
+  const PoseSolution& s = found->solution;
+  PoseTie loop;
+  loop.a = static_cast<int>(known_id);
+  loop.b = static_cast<int>(id);
+  loop.S_a_b = {s.T_map_camera.q, s.T_map_camera.p, found->scale};
+  const double way_sigma = std::max(kLoopWay, std::sqrt(s.cov.topLeftCorner<3, 3>().trace()));
+  const double turn_sigma = std::max(kLoopTurn, std::sqrt(s.cov.bottomRightCorner<3, 3>().trace()));
+  loop.sigma << Eigen::Vector3d::Constant(way_sigma), Eigen::Vector3d::Constant(turn_sigma), kLoopScale;
+  loops_.push_back(loop);
+
+  std::vector<Sim3> nodes;
+  for (const Place& place : places_) nodes.push_back(place.S_map_camera);
+  std::vector<PoseTie> ties(way_.begin(), way_.end());
+  const size_t first_loop = ties.size();
+  ties.insert(ties.end(), loops_.begin(), loops_.end());
+  const int first = static_cast<int>(places_.front().id);
+  for (PoseTie& tie : ties) {
+    tie.a -= first;
+    tie.b -= first;
+  }
+  (void)optimise(nodes, ties, first_loop, config_.with_scale);
+  for (size_t i = 0; i < nodes.size(); ++i) places_[i].S_map_camera = nodes[i];
+  S_map_odom_ = nodes.back() * Sim3{view.T_odom_camera.q, view.T_odom_camera.p, 1.0}.inverse();
+  Matrix6d cov = s.cov;  // seen from the place known, whose own doubt comes on top
+  const Eigen::Matrix3d R_map_place = places_[static_cast<size_t>(known_id - first)].S_map_camera.q.toRotationMatrix();
+  cov.topLeftCorner<3, 3>() = R_map_place * s.cov.topLeftCorner<3, 3>() * R_map_place.transpose();
+  cov.topRightCorner<3, 3>().setZero();
+  cov.bottomLeftCorner<3, 3>().setZero();
+  places_.back().cov = places_[static_cast<size_t>(known_id - first)].cov + cov;
+  ++num_loops_;
+  return true;
+}
+
+namespace {
+
+void put_sim3(const Sim3& S, StateWriter& writer) {
+  put_pose(S.rigid(), writer);
+  writer.put(S.scale);
+}
+
+void get_sim3(Sim3& S, StateReader& reader) {
+  SE3 T;
+  get_pose(T, reader);
+  S = {T.q, T.p, reader.get<double>()};
+}
+
+void put_tie(const PoseTie& tie, StateWriter& writer) {
+  writer.put(tie.a);
+  writer.put(tie.b);
+  put_sim3(tie.S_a_b, writer);
+  writer.put(tie.sigma);
+}
+
+PoseTie get_tie(StateReader& reader) {
+  PoseTie tie;
+  reader.get(tie.a);
+  reader.get(tie.b);
+  get_sim3(tie.S_a_b, reader);
+  reader.get(tie.sigma);
+  return tie;
+}
+
+}  // namespace
+
+void LoopCloser::save(StateWriter& writer) const {
+  writer.put(next_id_);
+  writer.put(num_loops_);
+  put_pose(T_odom_last_, writer);
+  put_sim3(S_map_odom_, writer);
+  writer.put(static_cast<int64_t>(places_.size()));
+  for (const Place& place : places_) {
+    writer.put(place.id);
+    put_sim3(place.S_map_camera, writer);
+    writer.put(place.cov);
+    writer.put(static_cast<int64_t>(place.points.size()));
+    for (const Eigen::Vector3f& p : place.points) writer.put(p);
+    writer.put(std::span<const uint8_t>(place.descriptors.data, place.descriptors.total()));
+  }
+  writer.put(static_cast<int64_t>(way_.size()));
+  for (const PoseTie& tie : way_) put_tie(tie, writer);
+  writer.put(static_cast<int64_t>(loops_.size()));
+  for (const PoseTie& tie : loops_) put_tie(tie, writer);
+}
+
+void LoopCloser::load(StateReader& reader) {
+  *this = LoopCloser(config_);
+  reader.get(next_id_);
+  reader.get(num_loops_);
+  get_pose(T_odom_last_, reader);
+  get_sim3(S_map_odom_, reader);
+  for (auto left = reader.get<int64_t>(); left > 0; --left) {
+    Place& place = places_.emplace_back();
+    reader.get(place.id);
+    get_sim3(place.S_map_camera, reader);
+    reader.get(place.cov);
+    for (auto points = reader.get<int64_t>(); points > 0; --points) reader.get(place.points.emplace_back());
+    std::vector<uint8_t> bytes;
+    reader.get(bytes);
+    const auto rows = static_cast<int>(place.points.size());
+    if (rows > 0 && bytes.size() != 32 * place.points.size()) throw std::runtime_error("state: a place is damaged");
+    if (rows > 0) place.descriptors = cv::Mat(rows, 32, CV_8UC1, bytes.data()).clone();
+    index_.add(place.id, place.descriptors);
+  }
+  for (auto left = reader.get<int64_t>(); left > 0; --left) way_.push_back(get_tie(reader));
+  for (auto left = reader.get<int64_t>(); left > 0; --left) loops_.push_back(get_tie(reader));
+}
+
+}  // namespace roadfix

@@ -1,0 +1,183 @@
+/// Places known again, and the way bent between them.
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "geometry/so3.h"
+#include "slam/loop_closer.h"
+#include "support/numerical_jacobian.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kFocal = 500.0;
+constexpr int kLap = 60;          ///< places of a lap
+constexpr double kRadius = 30.0;  // m
+
+Sim3 random_sim3(std::mt19937& random, double size) {
+  std::normal_distribution<double> normal(0.0, size);
+  Vector7d d;
+  for (int i = 0; i < 7; ++i) d(i) = normal(random);
+  return retract(Sim3{}, d);
+}
+
+TEST_CASE("a tie's derivatives are those of its error") {
+  std::mt19937 random(3);
+  for (int i = 0; i < 20; ++i) {
+    const Sim3 a = random_sim3(random, 0.8), b = random_sim3(random, 0.8);
+    PoseTie tie;
+    tie.S_a_b = random_sim3(random, 0.3) * (a.inverse() * b);
+    tie.sigma << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.05;
+    Matrix7d J_a, J_b;
+    (void)tie_error(tie, a, b, &J_a, &J_b);
+    constexpr double kStep = 1e-6;
+    for (int k = 0; k < 7; ++k) {
+      Vector7d d = Vector7d::Zero();
+      d(k) = kStep;
+      const Vector7d a_numeric = (tie_error(tie, retract(a, d), b) - tie_error(tie, retract(a, -d), b)) / (2 * kStep);
+      const Vector7d b_numeric = (tie_error(tie, a, retract(b, d)) - tie_error(tie, a, retract(b, -d))) / (2 * kStep);
+      REQUIRE((J_a.col(k) - a_numeric).norm() < 1e-5 * std::max(1.0, a_numeric.norm()));
+      REQUIRE((J_b.col(k) - b_numeric).norm() < 1e-5 * std::max(1.0, b_numeric.norm()));
+    }
+  }
+}
+
+TEST_CASE("similarities multiply and invert") {
+  std::mt19937 random(5);
+  const Sim3 a = random_sim3(random, 0.7), b = random_sim3(random, 0.7);
+  const Sim3 c = (a * b).inverse() * (a * b);
+  CHECK(c.p.norm() < 1e-12);
+  CHECK(log_q(c.q).norm() < 1e-12);
+  CHECK(c.scale == Approx(1.0));
+}
+
+/// A world of points that can be told apart, around a circle that the camera drives, looking ahead.
+struct World {
+  std::vector<Eigen::Vector3d> points;
+  cv::Mat descriptors;
+
+  explicit World(unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    for (int i = 0; i < 3000; ++i) {
+      const double angle = 2.0 * 3.14159265 * unit(random);
+      const double radius = kRadius + (unit(random) < 0.5 ? -1.0 : 1.0) * (4.0 + 10.0 * unit(random));
+      points.emplace_back(radius * std::cos(angle), -1.0 + 6.0 * unit(random) - 3.0, radius * std::sin(angle));
+    }
+    descriptors.create(static_cast<int>(points.size()), 32, CV_8UC1);
+    for (int i = 0; i < static_cast<int>(descriptors.total()); ++i) {
+      descriptors.data[i] = static_cast<uint8_t>(random() & 0xFFU);
+    }
+  }
+
+  [[nodiscard]] PlaceView view(const SE3& T_world_camera, const SE3& T_odom_camera, double scale, unsigned seed) const {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, 0.5 / kFocal);
+    PlaceView v;
+    v.T_odom_camera = T_odom_camera;
+    const SE3 T_camera_world = T_world_camera.inverse();
+    for (size_t i = 0; i < points.size() && v.normalised.size() < 250; ++i) {
+      const Eigen::Vector3d p = T_camera_world * points[i];
+      if (p.z() < 3.0 || p.z() > 30.0 || std::abs(p.x()) > 0.8 * p.z() || random() % 4 == 0) continue;
+      v.normalised.emplace_back(p.x() / p.z() + noise(random), p.y() / p.z() + noise(random));
+      v.p_camera.emplace_back(scale * p);
+      cv::Mat bits = descriptors.row(static_cast<int>(i)).clone();
+      for (int flips = 0; flips < 20; ++flips) {
+        const auto bit = random() % 256;
+        bits.data[bit / 8] ^= static_cast<uint8_t>(1U << (bit % 8));
+      }
+      v.descriptors.push_back(bits);
+    }
+    return v;
+  }
+};
+
+SE3 on_circle(double place) {
+  const double angle = 2.0 * 3.14159265 * place / kLap;
+  return {exp_q({0.0, -angle, 0.0}), {kRadius * std::cos(angle), 0.0, kRadius * std::sin(angle)}};
+}
+
+struct Laps {
+  double odom_error = 0.0, map_error = 0.0;  ///< m, end of the second lap against the first place
+  int loops = 0;
+  std::vector<uint8_t> state;
+};
+
+/// Two laps with an odometry that turns too much and, in mono, shrinks.
+Laps two_laps(bool with_scale, int save_at = -1) {
+  LoopCloserConfig config;
+  config.pose = {kFocal, 1.0, 4.0, 20, {}};
+  config.with_scale = with_scale;
+  auto closer = std::make_unique<LoopCloser>(config);
+  const World world(1);
+  SE3 T_odom = on_circle(0.0);
+  double scale = 1.0;
+  Laps laps;
+  for (int i = 0; i <= 2 * kLap; ++i) {
+    if (i > 0) {
+      SE3 step = on_circle(i - 1.0).inverse() * on_circle(i);
+      if (with_scale) scale *= 0.999;
+      step.p *= 1.003 * scale;
+      step.q = step.q * exp_q({0.0, 0.0007, 0.0002});
+      T_odom = T_odom * step;
+    }
+    (void)closer->visit(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
+    if (i != save_at) continue;
+    StateWriter writer;
+    closer->save(writer);
+    const auto state = writer.take();
+    closer = std::make_unique<LoopCloser>(config);
+    StateReader reader(state);
+    closer->load(reader);
+    reader.finish();
+  }
+  laps.loops = closer->num_loops();
+  laps.odom_error = (T_odom.p - on_circle(2 * kLap).p).norm();
+  const Sim3 end = closer->S_map_odom() * Sim3{T_odom.q, T_odom.p, 1.0};
+  laps.map_error = (end.p - on_circle(2 * kLap).p).norm();
+  StateWriter writer;
+  closer->save(writer);
+  laps.state = writer.take();
+  return laps;
+}
+
+TEST_CASE("a second lap is known again and the way closed, with and without scale") {
+  for (const bool with_scale : {false, true}) {
+    const Laps laps = two_laps(with_scale);
+    CHECK(laps.loops > 20);
+    CHECK(laps.odom_error > 2.0);  // teeth: without closing
+    CHECK(laps.map_error < 0.3);
+  }
+}
+
+TEST_CASE("another street is not taken for the one known") {
+  LoopCloserConfig config;
+  config.pose = {kFocal, 1.0, 4.0, 20, {}};
+  const World known(1), other(2);
+  const auto loops = [&](const World& later) {
+    LoopCloser closer(config);
+    for (int i = 0; i < 30; ++i) (void)closer.visit(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
+    for (int i = 0; i < 30; ++i) (void)closer.visit(later.view(on_circle(i), on_circle(i), 1.0, 6), false);
+    return closer.num_loops();
+  };
+  CHECK(loops(other) == 0);
+  CHECK(loops(known) > 15);  // teeth
+}
+
+TEST_CASE("the same laps give the same bytes, also through a saved state") {
+  const Laps one = two_laps(true);
+  CHECK(one.state == two_laps(true).state);
+  CHECK(one.state == two_laps(true, kLap + 10).state);
+}
+
+TEST_CASE("memory is bounded") {
+  LoopCloserConfig config;
+  config.pose = {kFocal, 1.0, 4.0, 20, {}};
+  config.max_places = 30;
+  LoopCloser closer(config);
+  const World world(1);
+  for (int i = 0; i < 2 * kLap; ++i) (void)closer.visit(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
+  CHECK(closer.num_places() == 30);
+}
+
+}  // namespace
+}  // namespace roadfix

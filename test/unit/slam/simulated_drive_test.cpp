@@ -1,0 +1,135 @@
+/// The estimator on simulated streets, by tracks without pixels: is its covariance that of its errors?
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdio>
+
+#include "geometry/determinism.h"
+#include "simulation/scene/street.h"
+#include "slam/keyframe_tracker.h"
+#include "support/simulated_tracks.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int kFrames = 110;
+constexpr double kStep = 1.0;  // m a frame, 10 m/s
+constexpr double kBaseline = 0.5;
+
+const CameraIntrinsics kLens{800, 400, 460.0, 460.0, 400.0, 200.0, Distortion::kNone, {}};
+
+/// Straight, a bend that the seed chooses, straight.
+SE3 true_pose(int frame, uint64_t seed) {
+  const double bend = 0.02 * (static_cast<double>(seed % 7) - 3.0) / 3.0;  // rad a frame
+  SE3 T;
+  for (int i = 0; i < frame; ++i) {
+    const double turn = i > 30 && i < 80 ? bend : 0.0;
+    const Eigen::Quaterniond half(Eigen::AngleAxisd(0.5 * turn, Eigen::Vector3d::UnitZ()));
+    T.p += kStep * (T.q * half * Eigen::Vector3d::UnitX());
+    T.q = T.q * half * half;
+  }
+  return T;
+}
+
+/// Looking along the vehicle's x, 1.6 m above the ground.
+const SE3 kVehicleLeft{Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.0, 0.0, 1.6}};
+
+struct Drive {
+  double nees = 0.0;                ///< of the last pose against the first, per degree of freedom
+  double error = 0.0, sigma = 0.0;  ///< m, of its position
+  int valid = 0;
+};
+
+Drive drive(uint64_t seed, bool stereo, double noise_px) {
+  fix_eigen_blocking();
+  StreetPlan plan;
+  for (int i = -10; i < kFrames + 60; ++i) {
+    const SE3 T = true_pose(std::clamp(i, 0, kFrames), seed);
+    plan.driven.push_back(T.p + (i - std::clamp(i, 0, kFrames)) * (T.q * Eigen::Vector3d::UnitX()));
+  }
+  plan.segments = {{0.0, StreetKind::kStreet}};
+  plan.seed = seed;
+  const World world = build_world(plan);
+  CameraRig rig;
+  rig.left = kLens;
+  rig.T_vehicle_left = kVehicleLeft;
+  const SE3 T_left_right{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, 0.0}};
+  if (stereo) {
+    rig.right = kLens;
+    rig.T_right_left = T_left_right.inverse();
+  }
+  TrackConfig tracks;
+  tracks.wanted = 250;
+  tracks.noise_px = noise_px;
+  std::optional<TrackSimulator::RightCamera> right;
+  if (stereo) right = TrackSimulator::RightCamera{Camera(kLens), T_left_right};
+  TrackSimulator simulator(world, tracks, Camera(kLens), right, seed);
+
+  KeyframeTrackerConfig config;
+  config.focal_std = config.radial_std = config.right_turn_std_deg = 0.0;  // this lens is known exactly
+  const auto seen = std::make_shared<test::SeenTracks>();
+  InlineExecutor executor;
+  KeyframeTracker tracker(config, rig, std::make_unique<test::SimulatedFrontEnd>(seen), executor,
+                          std::make_unique<test::SimulatedRightEye>(seen));
+  cv::Mat picture(kLens.height, kLens.width, CV_8UC1);
+  for (int i = 0; i < static_cast<int>(picture.total()); ++i) picture.data[i] = static_cast<uint8_t>(37 * i);
+
+  Drive result;
+  std::optional<SE3> T_local_enu;
+  for (int i = 0; i < kFrames; ++i) {
+    const SE3 T_enu_vehicle = true_pose(i, seed);
+    View view;
+    view.t_s = 0.1 * i;
+    view.T_enu_camera = T_enu_vehicle * kVehicleLeft;
+    seen->now.clear();
+    for (const TrackObservation& o : simulator.observe(view)) seen->now.emplace(o.id, o);
+    const int64_t t_us = 100'000 * (i + 1);
+    if (!stereo) tracker.speed({t_us, SpeedSource::kWheels, kStep / 0.1, 0.01, 0.0});
+    const TrackedFrame& out = tracker.process({t_us, picture, stereo ? picture : cv::Mat()});
+    const Odometry& o = out.odometry;
+    if (o.validity != Validity::kValid) continue;
+    ++result.valid;
+    if (!T_local_enu) T_local_enu = o.T_frame_vehicle * T_enu_vehicle.inverse();
+    const Vector6d e = local(o.T_frame_vehicle, *T_local_enu * T_enu_vehicle);
+    result.nees = e.dot(o.cov_pose.ldlt().solve(e)) / 6.0;
+    result.error = e.head<3>().norm();
+    result.sigma = std::sqrt(o.cov_pose.topLeftCorner<3, 3>().trace());
+  }
+  return result;
+}
+
+struct Drives {
+  double nees = 0.0, error = 0.0, sigma = 0.0;  ///< mean, and two medians
+};
+
+Drives drives(int count, bool stereo, double noise_px) {
+  Drives all;
+  std::vector<double> errors, sigmas;
+  for (int seed = 1; seed <= count; ++seed) {
+    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px);
+    CHECK(one.valid >= kFrames - 10);
+    all.nees += one.nees / count;
+    errors.push_back(one.error);
+    sigmas.push_back(one.sigma);
+  }
+  std::sort(errors.begin(), errors.end());
+  std::sort(sigmas.begin(), sigmas.end());
+  all.error = errors[errors.size() / 2];
+  all.sigma = sigmas[sigmas.size() / 2];
+  return all;
+}
+
+TEST_CASE("the covariance is that of the errors, whatever the noise", "[statistics]") {
+  for (const bool stereo : {true, false}) {
+    for (const double noise_px : {0.3, 0.6}) {
+      const Drives d = drives(20, stereo, noise_px);
+      // What scripts/figures.d/keyframe_tracker.py reads.
+      std::printf("nees %s %.1f px: %.3f, median error %.3f m, median sigma %.3f m\n", stereo ? "stereo" : "mono",
+                  noise_px, d.nees, d.error, d.sigma);
+      CHECK(d.nees > 0.5);
+      CHECK(d.nees < 2.0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace roadfix
