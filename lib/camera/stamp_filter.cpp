@@ -8,7 +8,7 @@ namespace {
 
 constexpr int64_t kMemory = 300;  ///< frames; half a minute at 10 Hz, over which two quartz clocks part by 3 ms at most
 constexpr int kMaxStrays = 5;
-constexpr int64_t kLearning = 8;  ///< frames over which an unknown period is learnt before it is trusted
+constexpr size_t kLearning = 9;  ///< frames over which an unknown period is learnt before it is trusted
 
 }  // namespace
 
@@ -18,23 +18,37 @@ StampFilter::StampFilter(std::optional<double> rate_hz)
 void StampFilter::begin(int64_t stamp_us) {
   origin_us_ = stamp_us;
   last_us_ = 0.0;
-  period_us_ = nominal_us_;
+  if (nominal_us_ > 0.0) period_us_ = nominal_us_;
   frames_ = 1;
   strays_ = 0;
 }
 
+/// An unknown period is the median of the first ones: a few skipped frames do not matter.
+int64_t StampFilter::learn(int64_t stamp_us) {
+  given_us_ = std::max(given_us_ + 1, stamp_us);
+  first_us_.push_back(stamp_us);
+  if (first_us_.size() < kLearning) return given_us_;
+  std::vector<int64_t> periods_us;
+  for (size_t i = 1; i < first_us_.size(); ++i) periods_us.push_back(first_us_[i] - first_us_[i - 1]);
+  std::sort(periods_us.begin(), periods_us.end());
+  begin(stamp_us);
+  period_us_ = std::max(1.0, static_cast<double>(periods_us[periods_us.size() / 2]));
+  frames_ = static_cast<int64_t>(kLearning);
+  first_us_.clear();
+  return given_us_;
+}
+
 int64_t StampFilter::filter(int64_t stamp_us) {
+  if (nominal_us_ <= 0.0 && period_us_ <= 0.0) return learn(stamp_us);
   if (frames_ == 0) {
     begin(stamp_us);
     return given_us_ = stamp_us;
   }
   const auto raw_us = static_cast<double>(stamp_us - origin_us_);
-  if (period_us_ <= 0.0) period_us_ = std::max(1.0, raw_us - last_us_);
   const double periods = std::max(1.0, std::round((raw_us - last_us_) / period_us_));
   const double expected_us = last_us_ + periods * period_us_;
   const double off_us = raw_us - expected_us;
-  const bool learning = nominal_us_ <= 0.0 && frames_ < kLearning;
-  if (std::abs(off_us) > 0.5 * period_us_ && !learning) {
+  if (std::abs(off_us) > 0.5 * period_us_) {
     if (++strays_ > kMaxStrays) {
       begin(stamp_us);
       return given_us_ = std::max(given_us_ + 1, stamp_us);
@@ -56,12 +70,16 @@ void StampFilter::save(StateWriter& writer) const {
   for (const double x : {period_us_, last_us_}) writer.put(x);
   for (const int64_t x : {origin_us_, frames_, given_us_}) writer.put(x);
   writer.put(strays_);
+  writer.put(static_cast<int64_t>(first_us_.size()));
+  for (const int64_t t : first_us_) writer.put(t);
 }
 
 void StampFilter::load(StateReader& reader) {
   for (double* x : {&period_us_, &last_us_}) reader.get(*x);
   for (int64_t* x : {&origin_us_, &frames_, &given_us_}) reader.get(*x);
   reader.get(strays_);
+  first_us_.clear();
+  for (auto left = reader.get<int64_t>(); left > 0; --left) reader.get(first_us_.emplace_back());
 }
 
 }  // namespace roadfix

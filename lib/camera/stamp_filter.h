@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "stream/state_bytes.h"
 
@@ -28,14 +29,16 @@ class StampFilter {
 
  private:
   void begin(int64_t stamp_us);
+  int64_t learn(int64_t stamp_us);
 
   double nominal_us_;  ///< 0 where nothing is known
   double period_us_ = 0.0;
-  int64_t origin_us_ = 0;  ///< the line's times are relative to it: a double holds them exactly enough
-  double last_us_ = 0.0;   ///< on the line
-  int64_t frames_ = 0;     ///< since the line began
-  int strays_ = 0;         ///< frames in a row far off it
-  int64_t given_us_ = 0;   ///< the last result
+  int64_t origin_us_ = 0;          ///< the line's times are relative to it: a double holds them exactly enough
+  double last_us_ = 0.0;           ///< on the line
+  int64_t frames_ = 0;             ///< since the line began
+  int strays_ = 0;                 ///< frames in a row far off it
+  int64_t given_us_ = 0;           ///< the last result
+  std::vector<int64_t> first_us_;  ///< stamps from which an unknown period is learnt
 };
 
 }  // namespace roadfix
