@@ -1,36 +1,44 @@
-/// From pictures to tracks in normalised coordinates: the front end with the gyro's help, and the right eye's share.
+/// From pictures to tracks in normalised coordinates: the front end with the gyro's help, and what the right eye sees.
 #pragma once
 
 #include "camera/camera.h"
 #include "features/front_end.h"
+#include "features/stereo_matcher.h"
 #include "msckf/tracks.h"
 
 namespace roadfix {
 
+/// The right eye: its lens and the left camera's coordinates to its own.
+struct RightEye {
+  CameraIntrinsics lens;
+  SE3 T_right_left;
+  StereoConfig matching;
+};
+
 class PictureTracks {
  public:
-  PictureTracks(const CameraIntrinsics& left, std::unique_ptr<FrontEnd> front_end);
+  PictureTracks(const CameraIntrinsics& left, const std::optional<RightEye>& right,
+                std::unique_ptr<FrontEnd> front_end);
 
-  /// Tracks in the next picture. `R_now_before`: the camera's turn since the last one, where it is known: tracks are
-  /// looked for where it takes them.
-  msckf::SeenFrame track(int64_t t_us, const cv::Mat& left, const std::optional<Eigen::Matrix3d>& R_now_before);
+  /// Tracks in the next picture; `right` may be empty. `R_now_before`: the camera's turn since the last one, where it
+  /// is known: tracks are looked for where it takes them.
+  msckf::SeenFrame track(int64_t t_us, const cv::Mat& left, const cv::Mat& right,
+                         const std::optional<Eigen::Matrix3d>& R_now_before);
 
   /// Where the last picture has its tracks.
   [[nodiscard]] std::span<const Feature> features() const { return features_; }
   [[nodiscard]] int num_expected() const { return front_end_->num_expected(); }
-  [[nodiscard]] FrontEnd& front_end() { return *front_end_; }
-  [[nodiscard]] const FrontEnd& front_end() const { return *front_end_; }
   [[nodiscard]] std::optional<int64_t> last_us() const { return last_us_; }
 
-  void set_last(std::optional<int64_t> t_us, std::vector<Feature> features) {
-    last_us_ = t_us;
-    features_ = std::move(features);
-  }
+  void save(StateWriter& writer) const;
+  void load(StateReader& reader);
 
  private:
   [[nodiscard]] std::vector<Feature> hints(const Eigen::Matrix3d& R_now_before) const;
 
   Camera left_;
+  std::optional<Camera> right_;
+  std::optional<StereoMatcher> matcher_;
   std::unique_ptr<FrontEnd> front_end_;
   std::vector<Feature> features_;
   std::optional<int64_t> last_us_;

@@ -10,6 +10,7 @@ namespace {
 constexpr size_t kEnoughTracks = 12;
 constexpr int64_t kPictureAgeUs = 500'000;
 constexpr int64_t kWheelAgeUs = 1'000'000;
+constexpr double kShaken = 3.0;
 constexpr double kWheelRest = 0.02;  // m/s
 
 }  // namespace
@@ -69,10 +70,13 @@ bool Standing::stands(int64_t t_us, std::optional<double> speed) const {
   const bool wheels_known = wheels_us_ != 0 && t_us - wheels_us_ < kWheelAgeUs;
   if (wheels_known && !wheels_rest_) return false;
   const int64_t block_age = t_us - block_.end_us;
-  const bool quiet = block_age < static_cast<int64_t>(2.1e6 * trust_.block_s) &&
-                     block_.gyro_wander < trust_.standing_gyro && block_.accel_wander < trust_.standing_accel;
-  if (!quiet) return false;
-  if (flow_ && t_us - frame_us_ < kPictureAgeUs) return *flow_ < trust_.standing_flow_px;
+  if (block_age > static_cast<int64_t>(2.1e6 * trust_.block_s)) return false;
+  const auto quiet = [&](double times) {
+    return block_.gyro_wander < times * trust_.standing_gyro && block_.accel_wander < times * trust_.standing_accel;
+  };
+  // A still picture is the better witness: an engine that shakes the imu does not move the car.
+  if (flow_ && t_us - frame_us_ < kPictureAgeUs) return *flow_ < trust_.standing_flow_px && quiet(kShaken);
+  if (!quiet(1.0)) return false;
   return wheels_known || (speed && *speed < trust_.standing_speed);
 }
 

@@ -7,6 +7,7 @@ class App;
 
 namespace roadfix {
 
+void add_calibrate_command(CLI::App& app);
 void add_doctor_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_export_command(CLI::App& app);

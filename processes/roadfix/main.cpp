@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   roadfix::fix_eigen_blocking();
   CLI::App app{"Roadfix: localization for road vehicles, replayable to the bit", "roadfix"};
   app.require_subcommand(1);
+  roadfix::add_calibrate_command(app);
   roadfix::add_doctor_command(app);
   roadfix::add_evaluate_command(app);
   roadfix::add_export_command(app);

@@ -2,11 +2,13 @@
 
 #include "config/config.h"
 #include "vo_tracker/keyframe_stage.h"
+#include "vo_tracker/msckf_stage.h"
 
 namespace roadfix {
 
 std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,
                                        const std::vector<uint8_t>& superpoint_weights) {
+  if (config.mode == VoMode::kMsckf) return std::make_unique<MsckfStage>(calibration, config, superpoint_weights);
   return std::make_unique<KeyframeStage>(calibration, config, superpoint_weights);
 }
 

@@ -1,5 +1,5 @@
 /// POSE_VO, VO_STATUS and VO_FEATURES from the cameras and what helps them: translates between messages and an
-/// estimator, lib/slam's in mode `keyframe`.
+/// estimator, lib/slam's in mode `keyframe`, lib/msckf's in mode `msckf`.
 #pragma once
 
 #include <filesystem>
@@ -7,11 +7,30 @@
 
 #include "bus/stage.h"
 #include "config/calibration.h"
+#include "features/front_end.h"
+#include "features/stereo_matcher.h"
+#include "msckf/config.h"
 #include "slam/config.h"
 
 namespace roadfix {
 
-enum class VoMode { kKeyframe };
+enum class VoMode { kKeyframe, kMsckf };
+
+/// Of mode `msckf`.
+struct MsckfVoConfig {
+  FrontEndConfig front_end{.max_features = 200};
+  StereoConfig stereo;
+  double publish_period = 0.02;  ///< s, of data time, between two poses
+  MsckfTuning tuning;
+};
+
+template <class Visitor>
+void visit(MsckfVoConfig& c, Visitor& v) {
+  v.group("front_end", c.front_end);
+  v.group("stereo", c.stereo);
+  v.number("publish_period_s", c.publish_period, 0.0, 10.0);
+  v.group("tuning", c.tuning);
+}
 
 /// configs/<vehicle>/vo_tracker.yaml.
 struct VoTrackerConfig {
@@ -21,16 +40,18 @@ struct VoTrackerConfig {
   double stereo_gap = 0.005;     ///< s, largest difference of the stamps of a stereo pair
   std::string superpoint_model;  ///< an ONNX file, relative to the configuration's folder; for front end superpoint
   KeyframeTrackerConfig keyframe;
+  MsckfVoConfig msckf;
 };
 
 template <class Visitor>
 void visit(VoTrackerConfig& c, Visitor& v) {
-  v.choice("mode", c.mode, {{"keyframe", VoMode::kKeyframe}});
+  v.choice("mode", c.mode, {{"keyframe", VoMode::kKeyframe}, {"msckf", VoMode::kMsckf}});
   v.integer("threads", c.threads, 1, 2);
   v.boolean("filter_stamps", c.filter_stamps);
   v.number("stereo_gap_s", c.stereo_gap, 0.0, 0.1);
   v.text("superpoint_model", c.superpoint_model);
   v.group("keyframe", c.keyframe);
+  v.group("msckf", c.msckf);
 }
 
 /// `superpoint_weights`: the bytes of superpoint_model. Throws where the calibration has no camera or not all of one.

@@ -2,8 +2,6 @@
 #include "vo_tracker/handler.h"
 
 #include <catch2/catch.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <roadfix/image_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
 #include <roadfix/vo_features_t.hpp>
@@ -11,14 +9,14 @@
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/message.h"
-#include "bus/stage_runner.h"
 #include "geometry/determinism.h"
 #include "geometry/so3.h"
-#include "support/street.h"
+#include "streams.h"
 
 namespace roadfix {
 namespace {
+
+using namespace test;
 
 constexpr int kWidth = 480, kHeight = 160, kFrames = 100;
 constexpr double kFocal = 280.0, kBaseline = 0.5, kStep = 0.8;  // m a frame
@@ -47,30 +45,6 @@ Calibration calibration(bool stereo) {
 
 /// Straight on for 60 frames, then standing.
 double travelled(int frame) { return kStep * std::min(frame, 60); }
-
-struct Sent {
-  int64_t arrival_us = 0;
-  std::string channel;
-  std::vector<uint8_t> bytes;
-};
-
-template <class T>
-Sent sent(const std::string& channel, int64_t utime, int64_t seq, T message, int64_t delay_us = 0) {
-  message.utime = utime;
-  message.run = 1;
-  message.seq = seq;
-  return {utime + delay_us, channel, encode(message)};
-}
-
-image_t picture_message(const cv::Mat& picture) {
-  image_t m{};
-  m.width_px = picture.cols;
-  m.height_px = picture.rows;
-  m.format = image_t::FORMAT_PNG;
-  cv::imencode(".png", picture, m.data);
-  m.size_bytes = static_cast<int32_t>(m.data.size());
-  return m;
-}
 
 const std::vector<Sent>& pictures() {
   static const std::vector<Sent> kPictures = [] {
@@ -102,29 +76,6 @@ std::vector<Sent> with_wheels(std::vector<Sent> all, int64_t late_us) {
   }
   std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
   return all;
-}
-
-class Collector final : public MessageSink {
- public:
-  void put(const std::string& channel, const Header&, std::span<const uint8_t> bytes) override {
-    messages[channel].emplace_back(bytes.begin(), bytes.end());
-  }
-  template <class T>
-  [[nodiscard]] std::vector<T> all(const std::string& channel) const {
-    std::vector<T> out;
-    if (messages.contains(channel)) {
-      for (const auto& bytes : messages.at(channel)) out.push_back(decode<T>(bytes));
-    }
-    return out;
-  }
-  std::map<std::string, std::vector<std::vector<uint8_t>>> messages;
-};
-
-void feed(StageRunner& runner, const Sent& message) {
-  const auto& inputs = runner.spec().inputs;
-  for (size_t i = 0; i < inputs.size(); ++i) {
-    if (inputs[i].channel == message.channel) runner.offer(static_cast<int>(i), message.bytes);
-  }
 }
 
 VoTrackerConfig threads(int count) {

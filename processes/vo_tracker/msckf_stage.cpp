@@ -1,0 +1,237 @@
+#include "vo_tracker/msckf_stage.h"
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <roadfix/image_t.hpp>
+#include <roadfix/imu_t.hpp>
+#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_status_t.hpp>
+#include <roadfix/wheels_t.hpp>
+
+#include "bus/message.h"
+#include "bus/sample_codec.h"
+#include "config/config.h"
+#include "geometry/frames.h"
+#include "vo_tracker/camera_rig.h"
+#include "vo_tracker/picture.h"
+
+namespace roadfix {
+namespace {
+
+enum Output { kPose = 0, kStatus = 1, kFeatures = 2 };
+constexpr int kImu = 0, kLeft = 1, kRight = 2;
+
+constexpr int64_t kFeedback_us = 500'000;        // DESIGN.md, section 4
+constexpr int64_t kWheelLateness_us = 50'000;    // there, too
+constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
+constexpr int64_t kImuTimeout_us = 200'000;
+
+template <class T>
+void take(const std::optional<T>& from, T& to) {
+  if (from) to = *from;
+}
+
+int8_t pose_state(const MsckfOutput& out) {
+  if (out.phase == MsckfPhase::kLost) return pose_t::STATE_LOST;
+  if (out.phase == MsckfPhase::kStarting) return pose_t::STATE_ALIGNING;
+  return out.reason.empty() ? pose_t::STATE_RUNNING : pose_t::STATE_WEAK;
+}
+
+int8_t scale_source(MsckfScale scale) {
+  switch (scale) {
+    case MsckfScale::kInertial:
+      return vo_status_t::SCALE_FROM_IMU;
+    case MsckfScale::kWheels:
+      return vo_status_t::SCALE_FROM_WHEELS;
+    case MsckfScale::kUnknown:
+      break;
+  }
+  return vo_status_t::SCALE_FROM_NONE;
+}
+
+}  // namespace
+
+MsckfVehicle msckf_vehicle(const Calibration& calibration) {
+  const CameraRig rig = camera_rig(calibration);
+  MsckfVehicle v;
+  v.T_imu_camera = rig.T_vehicle_left;
+  if (rig.right) v.T_left_right = rig.T_right_left.inverse();
+  if (const auto& imu = calibration.sensors.imu) {
+    take(imu->gyro_noise, v.gyro_noise);
+    take(imu->accel_noise, v.accel_noise);
+    take(imu->gyro_bias_std, v.gyro_bias_std);
+    take(imu->accel_bias_std, v.accel_bias_std);
+    take(imu->scale_std, v.scale_std);
+    take(imu->correlation, v.correlation_s);
+  }
+  const CameraCalibration& left = *calibration.sensors.camera_left;
+  take(left.time_offset, v.time_offset);
+  take(left.time_offset_std, v.time_offset_std);
+  take(left.stamp_jitter, v.stamp_jitter);
+  take(left.rate, v.camera_rate);
+  take(left.mounting->std, v.camera_std);
+  if (left.mounting->std_deg) v.camera_turn_std = *left.mounting->std_deg * kDegree;
+  if (const auto& wheels = calibration.sensors.wheels) {
+    take(wheels->speed_scale_std, v.wheel_scale_std);
+    take(wheels->speed_noise, v.wheel_noise);
+    take(wheels->track_width, v.track_width);
+  }
+  if (calibration.mounting && calibration.mounting->std_deg)
+    v.mounting_std = calibration.mounting->std_deg->tail<2>().maxCoeff() * kDegree;
+  return v;
+}
+
+MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& config,
+                       const std::vector<uint8_t>& superpoint_weights)
+    : calibration_(calibration),
+      config_(config),
+      superpoint_weights_(superpoint_weights),
+      stereo_(calibration.sensors.camera_right.has_value()) {
+  fix_opencv_threads();
+  make_parts();
+  spec_.name = "vo_tracker";
+  spec_.inputs = {{"IMU", "imu_t", 0, 0}, {"CAMERA_LEFT", "image_t", kCameraLateness_us, 0}};
+  if (stereo_) spec_.inputs.push_back({"CAMERA_RIGHT", "image_t", kCameraLateness_us, 0});
+  wheels_ = static_cast<int>(spec_.inputs.size());
+  spec_.inputs.push_back({"WHEELS", "wheels_t", kWheelLateness_us, 0});
+  ins_ = static_cast<int>(spec_.inputs.size());
+  spec_.inputs.push_back({"POSE_INS", "pose_t", 0, kFeedback_us});
+  spec_.clocks = {{kImu, kImuTimeout_us}};
+  spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
+}
+
+void MsckfStage::make_parts() {
+  MsckfConfig config;
+  static_cast<MsckfTuning&>(config) = config_.msckf.tuning;
+  config.vehicle = msckf_vehicle(calibration_);
+  filter_.emplace(config);
+  const CameraRig rig = camera_rig(calibration_);
+  std::optional<RightEye> right;
+  if (rig.right) right = RightEye{*rig.right, rig.T_right_left, config_.msckf.stereo};
+  pictures_.emplace(rig.left, right, make_front_end(config_.msckf.front_end, superpoint_weights_));
+}
+
+void MsckfStage::apply(const Message& m) {
+  if (m.input == kImu) {
+    const ImuSample imu = imu_sample(decode<imu_t>(m.bytes));
+    (void)filter_->advance(imu);
+    while (!ahead_.empty() && ahead_.front().t_us <= imu.t_us) ahead_.pop_front();
+  } else if (m.input == kLeft) {
+    if (waiting_) track_waiting();
+    waiting_ = Waiting{m.utime, grey_picture(decode<image_t>(m.bytes)), {}};
+  } else if (stereo_ && m.input == kRight) {
+    const auto gap_us = static_cast<int64_t>(std::llround(config_.stereo_gap * 1e6));
+    if (waiting_ && std::abs(waiting_->t_us - m.utime) <= gap_us)
+      waiting_->right = grey_picture(decode<image_t>(m.bytes));
+  } else if (m.input == wheels_) {
+    filter_->add(wheel_sample(decode<wheels_t>(m.bytes)));
+  } else if (m.input == ins_) {
+    const Odometry o = odometry(decode<pose_t>(m.bytes));
+    if (o.validity != Validity::kInvalid)
+      filter_->add_speed(m.utime + kFeedback_us, o.velocity.x(), std::sqrt(o.cov_velocity(0, 0)));
+  }
+}
+
+void MsckfStage::track_waiting() {
+  const Waiting picture = std::move(*waiting_);
+  waiting_.reset();
+  tracked_ = true;
+  if (picture.left.empty()) return;
+  brightness_ = cv::mean(picture.left)[0];
+  std::optional<Eigen::Matrix3d> turn;
+  if (const auto last = pictures_->last_us()) turn = filter_->camera_turn(*last, picture.t_us);
+  filter_->add(pictures_->track(picture.t_us, picture.left, picture.right, turn));
+}
+
+void MsckfStage::on_clock(const Message& m) { ahead_.push_back(imu_sample(decode<imu_t>(m.bytes))); }
+
+void MsckfStage::publish(int64_t now_utime, Outputs& outputs) {
+  if (waiting_) track_waiting();  // its right picture comes with it or not at all
+  const auto period_us = static_cast<int64_t>(std::llround(1e6 * config_.msckf.publish_period));
+  const int64_t slot = period_us > 0 ? now_utime / period_us : now_utime;
+  if (slot == pose_slot_ && !tracked_) return;
+  const std::vector<ImuSample> ahead(ahead_.begin(), ahead_.end());
+  const MsckfOutput out = filter_->output(ahead);
+  if (slot != pose_slot_) {
+    pose_slot_ = slot;
+    pose_t pose{};
+    fill_pose(out.odometry, pose);
+    pose.frame = pose_t::FRAME_LOCAL;
+    pose.origin = pose_t::ORIGIN_IMU;
+    pose.scale = out.scale == MsckfScale::kUnknown ? pose_t::SCALE_UNKNOWN : pose_t::SCALE_METRIC;
+    pose.state = pose_state(out);
+    pose.reason = out.reason;
+    pose.reset_counter = out.reset_counter;
+    pose.reset_delta_q_wxyz[0] = 1.0;
+    outputs.publish(kPose, pose);
+  }
+  if (tracked_) publish_frame(out, outputs);
+  tracked_ = false;
+}
+
+void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
+  vo_status_t status{};
+  status.mode = vo_status_t::MODE_MSCKF;
+  status.state = out.phase == MsckfPhase::kLost       ? vo_status_t::STATE_LOST
+                 : out.phase == MsckfPhase::kStarting ? vo_status_t::STATE_INITIALISING
+                 : out.reason.empty()                 ? vo_status_t::STATE_GOOD
+                                                      : vo_status_t::STATE_WEAK;
+  status.reason = out.reason;
+  status.front_end = "klt";
+  status.scale_source = scale_source(out.scale);
+  const double speed = out.odometry.velocity.norm();
+  status.scale_std = speed > 0.1 ? std::sqrt(out.odometry.cov_velocity(0, 0)) / speed : 0.0;
+  status.num_features = static_cast<int32_t>(pictures_->features().size());
+  status.num_matches = out.num_tracks;
+  const msckf::PointCounts& counts = filter_->counts();
+  status.num_inliers = counts.used;
+  status.inlier_ratio = out.used_share;
+  status.reprojection_rms_px =
+      counts.dof_sum > 0 ? config_.msckf.tuning.window.sigma_px * std::sqrt(counts.nis_sum / counts.dof_sum) : 0.0;
+  status.brightness = brightness_;
+  status.num_map_points = out.num_landmarks;
+  if (const msckf::State* state = filter_->state()) {
+    status.time_offset_s = -state->camera.time_offset;
+    status.time_offset_std_s = std::sqrt(state->P()(msckf::kTimeOffset, msckf::kTimeOffset));
+  }
+  outputs.publish(kStatus, status);
+  vo_features_t features{};
+  for (const Feature& f : pictures_->features()) {
+    features.track_id.push_back(f.track);
+    features.u_px.push_back(f.pixel.x());
+    features.v_px.push_back(f.pixel.y());
+    features.use.push_back(vo_features_t::USE_MATCHED);
+  }
+  features.num_features = static_cast<int32_t>(features.track_id.size());
+  outputs.publish(kFeatures, features);
+}
+
+std::vector<uint8_t> MsckfStage::save() const {
+  StateWriter writer;
+  const std::vector<uint8_t> filter = filter_->save();
+  writer.put(std::span<const uint8_t>(filter));
+  pictures_->save(writer);
+  writer.put(pose_slot_);
+  writer.put(tracked_);
+  writer.put(brightness_);
+  return writer.take();
+}
+
+void MsckfStage::load(std::span<const uint8_t> state) {
+  make_parts();
+  StateReader reader(state);
+  std::vector<uint8_t> filter;
+  reader.get(filter);
+  filter_->load(filter);
+  pictures_->load(reader);
+  reader.get(pose_slot_);
+  reader.get(tracked_);
+  reader.get(brightness_);
+  reader.finish();
+  ahead_.clear();
+}
+
+std::string MsckfStage::effective_config() const { return config_text(config_); }
+std::string MsckfStage::effective_calibration() const { return calibration_text(calibration_); }
+
+}  // namespace roadfix
