@@ -1,0 +1,90 @@
+/// What the monitor decides, without bus, clock or file: told what was seen and when, it says whether the estimate may
+/// be used, and why not.
+///
+/// Time is data: `now` comes with every call and never runs backwards here; live it is the clock, of a log the time of
+/// recording. Decisions fall on a grid of 0.1 s, so that the same messages at the same times give the same reports.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "health/agreement.h"
+#include "health/alarms.h"
+#include "health/channel_watch.h"
+#include "health/nis_watch.h"
+#include "health/pose_watch.h"
+#include "health/process_watch.h"
+
+namespace roadfix {
+
+/// What only the machine itself knows; absent on a log.
+struct HostFacts {
+  std::optional<double> free_disk_gib;  ///< where drives are recorded to
+  std::optional<double> clock_step_s;   ///< the computer's clock minus what the stack counts
+  int64_t kernel_drops = 0;             ///< at the monitor's own socket, since start
+};
+
+struct HealthReport {
+  int64_t now_us = 0;
+  Verdict verdict = Verdict::kDoNotUse;
+  int64_t since_us = 0;
+  std::vector<Condition> reasons;
+  std::string judged_pose;  ///< the channel that the verdict is about; empty: none was heard
+  double lag_s = 0.0;       ///< of a drive that is played again: how old its stamps are
+  std::vector<ChannelReport> channels;
+  std::vector<ProcessReport> processes;
+  std::vector<NisReport> consistency;
+  std::vector<Agreement> agreements;
+};
+
+class Health {
+ public:
+  Health(const HealthConfig& config, const Expectations& expectations);
+
+  void arrived(const std::string& channel, const Arrival& arrival);
+  void undecodable(const std::string& channel, int64_t now_us, const std::string& why);
+  void unusable(const std::string& channel, int64_t now_us);
+  void heartbeat(const std::string& process, int64_t now_us, const HeartbeatFacts& facts);
+  void pose(const std::string& channel, int64_t now_us, PoseFacts facts);
+  void measurement(const std::string& source, int64_t now_us, double nis, int dof, bool accepted);
+  void host(int64_t now_us, const HostFacts& facts);
+
+  /// The next moment of decision that `now` has reached; nothing when none has. After a long silence of everything (a
+  /// log with a hole) only the last few are made up for.
+  [[nodiscard]] std::optional<int64_t> next_decision(int64_t now_us);
+
+  /// Decides. True where the verdict or the set of reasons changed.
+  bool decide(int64_t now_us);
+
+  [[nodiscard]] Verdict verdict() const { return alarms_.verdict(); }
+  [[nodiscard]] HealthReport report() const;  ///< of the last decision
+  [[nodiscard]] const std::map<std::string, PoseWatch>& poses() const { return poses_; }
+  /// Of the frame that absolute poses are given in here: the first one heard.
+  [[nodiscard]] const std::optional<Geodetic>& anchor() const { return anchor_; }
+
+ private:
+  ChannelWatch& channel(const std::string& name);
+  [[nodiscard]] std::string judged_pose() const;
+  [[nodiscard]] int64_t common_lag_us() const;
+  void judge_host(std::vector<Condition>& out) const;
+  [[nodiscard]] std::vector<Agreement> agreements() const;
+
+  HealthConfig config_;
+  Expectations expectations_;
+  Alarms alarms_;
+  std::map<std::string, ChannelWatch> channels_;
+  std::map<std::string, ProcessWatch> processes_;
+  std::map<std::string, PoseWatch> poses_;
+  std::map<std::string, NisWatch> sources_;
+  HostFacts host_;
+  Recent own_drops_;
+  std::optional<Geodetic> anchor_;
+  std::optional<int64_t> start_us_;  ///< the first thing told
+  int64_t decided_us_ = 0;
+  int64_t lag_us_ = 0;
+};
+
+}  // namespace roadfix

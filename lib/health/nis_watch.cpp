@@ -1,0 +1,72 @@
+#include "health/nis_watch.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace roadfix {
+
+namespace {
+
+/// A slow source is judged by this many, however old, up to the age below.
+constexpr std::size_t kLeast = 5;
+constexpr int64_t kOldest_us = 10'000'000;
+constexpr std::size_t kMost = 1000;
+/// Degrees of freedom below which a mean says too little: at 10 a ratio of 5 is a chance of 1e-7.
+constexpr int kLeastDof = 10;
+constexpr int kLeastRefused = 3;
+
+}  // namespace
+
+void NisWatch::seen(int64_t now_us, double nis, int dof, bool accepted) {
+  if (!std::isfinite(nis) || dof <= 0) return;
+  attempts_.push_back({now_us, nis, dof, accepted});
+  while (attempts_.size() > kMost || now_us - attempts_.front().now_us > kOldest_us) attempts_.pop_front();
+}
+
+std::vector<NisWatch::Attempt> NisWatch::window(int64_t now_us) const {
+  const auto window_us = std::llround(limits_.window * 1e6);
+  std::vector<Attempt> recent;
+  for (auto attempt = attempts_.rbegin(); attempt != attempts_.rend(); ++attempt) {
+    const int64_t age_us = now_us - attempt->now_us;
+    if (age_us > kOldest_us || (age_us > window_us && recent.size() >= kLeast)) break;
+    recent.push_back(*attempt);
+  }
+  return recent;
+}
+
+NisReport NisWatch::report(int64_t now_us) const {
+  NisReport report;
+  report.source = source_;
+  double sum = 0.0;
+  int dof = 0;
+  for (const Attempt& attempt : window(now_us)) {
+    if (!attempt.accepted) {
+      ++report.refused;
+      continue;
+    }
+    ++report.used;
+    sum += attempt.nis;
+    dof += attempt.dof;
+  }
+  if (dof > 0) report.ratio = sum / dof;
+  return report;
+}
+
+void NisWatch::judge(int64_t now_us, std::vector<Condition>& out) const {
+  const NisReport r = report(now_us);
+  int dof = 0;
+  for (const Attempt& attempt : window(now_us)) dof += attempt.accepted ? attempt.dof : 0;
+  if (dof >= kLeastDof && r.ratio > limits_.nis_ratio) {
+    out.push_back({"nis." + source_, Verdict::kDegraded, kRankConsistency,
+                   fmt::format("{} fits worse than it claims: squared errors are {:.1f} times what they should be",
+                               source_, r.ratio)});
+  }
+  if (r.refused >= kLeastRefused && r.refused > limits_.refused_share * (r.used + r.refused)) {
+    out.push_back({"refused." + source_, Verdict::kDegraded, kRankConsistency,
+                   fmt::format("{} is refused: {} of the last {} contradict the estimate", source_, r.refused,
+                               r.used + r.refused)});
+  }
+}
+
+}  // namespace roadfix

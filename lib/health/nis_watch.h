@@ -1,0 +1,45 @@
+/// What an estimator says of its measurements: do they fit as well as it believes (windowed NIS), and how many does it
+/// refuse.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "health/health_config.h"
+#include "health/verdict.h"
+
+namespace roadfix {
+
+struct NisReport {
+  std::string source;
+  double ratio = 0.0;  ///< mean of NIS over mean of its degrees of freedom, of what was accepted; honest: about one
+  int used = 0;        ///< in the window
+  int refused = 0;     ///< gated, in the window
+};
+
+class NisWatch {
+ public:
+  /// `source`: for people, for example "GNSS position in INS".
+  NisWatch(const std::string& source, const ConsistencyLimits& limits) : source_(source), limits_(limits) {}
+
+  void seen(int64_t now_us, double nis, int dof, bool accepted);
+  void judge(int64_t now_us, std::vector<Condition>& out) const;
+  [[nodiscard]] NisReport report(int64_t now_us) const;
+
+ private:
+  struct Attempt {
+    int64_t now_us = 0;
+    double nis = 0.0;
+    int dof = 0;
+    bool accepted = false;
+  };
+  [[nodiscard]] std::vector<Attempt> window(int64_t now_us) const;
+
+  std::string source_;
+  ConsistencyLimits limits_;
+  std::deque<Attempt> attempts_;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,76 @@
+/// One estimate: is it valid, how sure is it, does it jump, and where was it a moment ago.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "health/health_config.h"
+#include "health/recent.h"
+#include "health/verdict.h"
+#include "samples/samples.h"
+
+namespace roadfix {
+
+struct PoseFacts {
+  Odometry odometry;
+  std::optional<Geodetic> anchor;  ///< of ENU; absent: a frame of the estimator's own
+  bool metric = true;              ///< false: lengths are up to one common factor
+  std::string reason;              ///< of its state, plain words
+  int64_t run = 0;
+  int32_t reset_counter = 0;
+};
+
+/// 68 % of the horizontal error lies within one of these along its axis.
+struct HorizontalEllipse {
+  double major = 0.0;      ///< m, one sigma
+  double minor = 0.0;      ///< m
+  double direction = 0.0;  ///< rad, of the major axis, counterclockwise from the frame's x
+};
+/// Of the covariance of x and y; zero where it is not finite.
+HorizontalEllipse horizontal_ellipse(const Eigen::Matrix2d& covariance);
+
+class PoseWatch {
+ public:
+  PoseWatch(const std::string& name, const PoseLimits& limits) : name_(name), limits_(limits) {}
+
+  /// `facts` in the frame that all absolute poses share (health/health.h sees to that).
+  void seen(int64_t now_us, const PoseFacts& facts);
+
+  /// `judged`: this is the estimate that the verdict is about.
+  void judge(int64_t now_us, bool judged, std::vector<Condition>& out) const;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::optional<PoseFacts>& newest() const { return newest_; }
+  [[nodiscard]] int64_t newest_now_us() const { return now_us_; }
+  [[nodiscard]] bool usable() const;
+
+  struct Point {
+    int64_t t_us = 0;
+    SE3 T_frame_vehicle;
+    Eigen::Matrix2d cov = Eigen::Matrix2d::Zero();
+    int segment = 0;  ///< counts up where the estimate jumped, began again or was invalid
+  };
+  /// Between two points of one segment; absent outside of what is kept, the last seconds.
+  [[nodiscard]] std::optional<Point> at(int64_t t_us) const;
+
+ private:
+  void watch_jumps(int64_t now_us, const PoseFacts& facts);
+  void keep(const PoseFacts& facts);
+  void judge_numbers(bool judged, std::vector<Condition>& out) const;
+  [[nodiscard]] Condition condition(const std::string& what, Verdict verdict, const std::string& text) const;
+
+  std::string name_;
+  PoseLimits limits_;
+  std::optional<PoseFacts> newest_;
+  int64_t now_us_ = 0;
+  bool was_usable_ = false;
+  std::deque<Point> track_;
+  int segment_ = 0;
+  Recent jumps_, resets_;
+  double jump_m_ = 0.0, reset_m_ = 0.0;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,74 @@
+#include "health/process_watch.h"
+
+#include <fmt/format.h>
+
+namespace roadfix {
+
+namespace {
+
+constexpr double kMebi = 1024.0 * 1024.0;
+
+double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
+
+}  // namespace
+
+void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
+  if (newest_ && newest_->run != facts.run) {
+    ++restarts_;
+  } else if (newest_ && facts.kernel_drops > newest_->kernel_drops) {
+    drops_.add(now_us, facts.kernel_drops - newest_->kernel_drops);
+  }
+  newest_ = facts;
+  now_us_ = now_us;
+}
+
+bool ProcessWatch::silent(int64_t now_us) const { return newest_ && seconds(now_us - now_us_) > limits_.heartbeat; }
+
+Condition ProcessWatch::condition(const std::string& what, const std::string& text) const {
+  return {"process." + name_ + "." + what, Verdict::kDegraded, kRankProcess, name_ + " " + text};
+}
+
+void ProcessWatch::judge(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const {
+  if (!newest_) {
+    if (now_us >= start_us) out.push_back(condition("missing", "has shown no sign of life"));
+    return;
+  }
+  if (newest_->state == ProcessState::kStopping) {
+    out.push_back(condition("stopped", "was stopped"));
+    return;
+  }
+  if (silent(now_us)) {
+    out.push_back(
+        condition("silent", fmt::format("has shown no sign of life for {:.0f} s", seconds(now_us - now_us_))));
+    return;
+  }
+  if (newest_->state == ProcessState::kNoClock)
+    out.push_back(condition("no_clock", "stands still: " + newest_->reason));
+  if (newest_->state == ProcessState::kDegraded) out.push_back(condition("degraded", "says: " + newest_->reason));
+  judge_load(now_us, out);
+}
+
+void ProcessWatch::judge_load(int64_t now_us, std::vector<Condition>& out) const {
+  const HeartbeatFacts& f = *newest_;
+  if (f.cpu_share > limits_.cpu_share)
+    out.push_back(condition("cpu", fmt::format("takes {:.0f} % of a processor core", 100.0 * f.cpu_share)));
+  if (static_cast<double>(f.rss_bytes) > limits_.memory_mib * kMebi)
+    out.push_back(condition("memory", fmt::format("holds {:.0f} MiB", static_cast<double>(f.rss_bytes) / kMebi)));
+  if (f.queue_age_s > limits_.queue_age)
+    out.push_back(
+        condition("behind", fmt::format("is behind: {} waits {:.1f} s for it", f.queue_channel, f.queue_age_s)));
+  if (const int64_t drops = drops_.within(now_us); drops > 0)
+    out.push_back(condition("kernel_drops", fmt::format("lost {} datagrams: the kernel had no room for them", drops)));
+}
+
+ProcessReport ProcessWatch::report(int64_t now_us) const {
+  ProcessReport report;
+  report.name = name_;
+  report.newest = newest_;
+  report.restarts = restarts_;
+  if (newest_) report.age_s = seconds(now_us - now_us_);
+  report.silent = silent(now_us);
+  return report;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,58 @@
+/// One process by its heartbeats: alive, running, keeping up.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "health/health_config.h"
+#include "health/recent.h"
+#include "health/verdict.h"
+
+namespace roadfix {
+
+enum class ProcessState { kStarting, kRunning, kNoClock, kDegraded, kStopping };
+
+struct HeartbeatFacts {
+  int64_t run = 0;
+  ProcessState state = ProcessState::kStarting;
+  std::string reason;  ///< of the state, plain words
+  double cpu_share = 0.0;
+  int64_t rss_bytes = 0;
+  int64_t kernel_drops = 0;
+  double queue_age_s = 0.0;  ///< of the input that waits longest
+  std::string queue_channel;
+  int32_t queue_depth = 0;  ///< all inputs together
+};
+
+struct ProcessReport {
+  std::string name;
+  std::optional<HeartbeatFacts> newest;
+  double age_s = -1.0;  ///< since the newest heartbeat; -1: never heard
+  int restarts = 0;
+  bool silent = false;
+};
+
+class ProcessWatch {
+ public:
+  ProcessWatch(const std::string& name, const ProcessLimits& limits) : name_(name), limits_(limits) {}
+
+  void heartbeat(int64_t now_us, const HeartbeatFacts& facts);
+  void judge(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const;
+  [[nodiscard]] ProcessReport report(int64_t now_us) const;
+
+ private:
+  [[nodiscard]] bool silent(int64_t now_us) const;
+  [[nodiscard]] Condition condition(const std::string& what, const std::string& text) const;
+  void judge_load(int64_t now_us, std::vector<Condition>& out) const;
+
+  std::string name_;
+  ProcessLimits limits_;
+  std::optional<HeartbeatFacts> newest_;
+  int64_t now_us_ = 0;
+  int restarts_ = 0;
+  Recent drops_;
+};
+
+}  // namespace roadfix

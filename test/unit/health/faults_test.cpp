@@ -1,0 +1,226 @@
+// Each fault is told within a second and forgotten within two of its end; the same drive without it says "ok".
+#include <catch2/catch.hpp>
+
+#include "small_car.h"
+
+using namespace roadfix;
+using test::SmallCar;
+
+namespace {
+
+constexpr double kFault = 10.0, kMended = 15.0;
+bool faulty(double t) { return t >= kFault && t < kMended; }
+
+/// Drives with the fault between 10 and 15 s. `key` must be told in time and be gone in time.
+void check_told(SmallCar& car, const std::string& key, Verdict verdict) {
+  car.drive(0.0, kFault);
+  INFO(car.reasons());
+  REQUIRE(car.health.verdict() == Verdict::kOk);
+  const double told = car.told(key, kFault, kMended);
+  INFO(key << " told at " << told << "\n" << car.reasons());
+  CHECK(told >= kFault);
+  CHECK(told <= kFault + 1.0);
+  Verdict worst = Verdict::kOk;
+  car.drive(kMended, kMended + 0.2, [&](double) { worst = std::max(worst, car.health.verdict()); });
+  CHECK(worst == verdict);
+  car.drive(kMended + 0.2, kMended + 2.0);
+  CHECK(car.health.verdict() == Verdict::kOk);
+}
+
+}  // namespace
+
+TEST_CASE("a drive without faults is ok from the end of learning on") {
+  SmallCar car;
+  bool always = true;
+  car.drive(0.0, 5.0);
+  car.drive(5.0, 60.0, [&](double) { always = always && car.health.verdict() == Verdict::kOk; });
+  INFO(car.reasons());
+  CHECK(always);
+  CHECK(car.health.report().judged_pose == "POSE_FUSED");
+}
+
+TEST_CASE("a sensor that falls silent") {
+  SmallCar car;
+  car.arrival = [](const std::string& channel, double t, Arrival&) { return channel != "GNSS" || !faulty(t); };
+  check_told(car, "channel.GNSS.silent", Verdict::kDegraded);
+}
+
+TEST_CASE("the judged estimate falls silent: do not use") {
+  SmallCar car;
+  car.arrival = [](const std::string& channel, double t, Arrival&) { return channel != "POSE_FUSED" || !faulty(t); };
+  check_told(car, "channel.POSE_FUSED.silent", Verdict::kDoNotUse);
+}
+
+TEST_CASE("a sensor that loses every third message, and one that loses one in fifty") {
+  for (const int nth : {3, 50}) {
+    SmallCar car;
+    car.arrival = [&](const std::string& channel, double t, Arrival& a) {
+      return channel != "IMU" || !faulty(t) || a.seq % nth != 0;
+    };
+    if (nth == 3) {
+      check_told(car, "channel.IMU.lost", Verdict::kDegraded);
+      CHECK(car.health.report().channels[1].lost > 100);
+    } else {
+      car.drive(0.0, kMended);
+      CHECK(car.health.verdict() == Verdict::kOk);
+      CHECK(car.health.report().channels[1].name == "IMU");
+      CHECK(car.health.report().channels[1].lost == 10);
+    }
+  }
+}
+
+TEST_CASE("a sensor at half its rate") {
+  SmallCar car;
+  int64_t sent = 0;
+  car.arrival = [&](const std::string& channel, double t, Arrival& a) {
+    if (channel != "IMU") return true;
+    if (faulty(t) && static_cast<int>(t * 100 + 0.5) % 2 == 1) return false;
+    a.seq = sent++;
+    return true;
+  };
+  car.drive(0.0, kFault);
+  REQUIRE(car.health.verdict() == Verdict::kOk);
+  CHECK(car.told("channel.IMU.slow", kFault, kMended) > kFault);
+}
+
+TEST_CASE("stamps: late, ahead, jumping") {
+  const auto shifted = [](double by_s) {
+    SmallCar car;
+    car.arrival = [by_s](const std::string& channel, double t, Arrival& a) {
+      if (channel == "GNSS" && faulty(t)) a.utime += static_cast<int64_t>(by_s * 1e6);
+      return true;
+    };
+    return car;
+  };
+  SECTION("a jump is told at once, forth and back") {
+    SmallCar car = shifted(-5.0);
+    check_told(car, "channel.GNSS.stamp_jump", Verdict::kDegraded);
+  }
+  SECTION("late") {
+    SmallCar car = shifted(-0.45);
+    car.drive(0.0, kFault);
+    CHECK(car.told("channel.GNSS.late", kFault, kMended) > 0.0);
+  }
+  SECTION("ahead") {
+    SmallCar car = shifted(0.3);
+    car.drive(0.0, kFault);
+    CHECK(car.told("channel.GNSS.ahead", kFault, kMended) > 0.0);
+  }
+  SECTION("a little late is no fault") {
+    SmallCar car = shifted(-0.15);
+    car.drive(0.0, kMended);
+    CHECK(car.health.verdict() == Verdict::kOk);
+  }
+}
+
+TEST_CASE("a drive that is played again years later is judged the same") {
+  SmallCar car;
+  car.lag_us = int64_t{3} * 365 * 86'400 * 1'000'000;
+  car.drive(0.0, kFault);
+  INFO(car.reasons());
+  CHECK(car.health.verdict() == Verdict::kOk);
+  CHECK(car.health.report().lag_s == Approx(static_cast<double>(car.lag_us) * 1e-6).margin(0.1));
+  car.arrival = [](const std::string& channel, double t, Arrival&) { return channel != "GNSS" || !faulty(t); };
+  CHECK(car.told("channel.GNSS.silent", kFault, kMended) < kFault + 1.0);
+}
+
+TEST_CASE("a frozen sensor repeats itself; a sensor that differs does not") {
+  SmallCar car;
+  car.arrival = [](const std::string& channel, double t, Arrival& a) {
+    if (channel == "IMU" && faulty(t)) a.content = 7;
+    return true;
+  };
+  check_told(car, "channel.IMU.frozen", Verdict::kDegraded);
+}
+
+TEST_CASE("garbage, numbers that are none, two publishers") {
+  SmallCar car;
+  car.tick = [&](double t) {
+    if (faulty(t)) car.health.undecodable("GNSS", test::at(t), "ends too early");
+  };
+  check_told(car, "channel.GNSS.undecodable", Verdict::kDegraded);
+
+  SmallCar other;
+  other.tick = [&](double t) {
+    if (faulty(t)) other.health.unusable("IMU", test::at(t));
+  };
+  check_told(other, "channel.IMU.unusable", Verdict::kDegraded);
+
+  SmallCar third;
+  third.arrival = [](const std::string& channel, double t, Arrival& a) {
+    if (channel == "IMU" && faulty(t) && a.seq % 2 == 0) a.run = 2;
+    return true;
+  };
+  check_told(third, "channel.IMU.two_publishers", Verdict::kDegraded);
+}
+
+TEST_CASE("one restart of a publisher is no second publisher") {
+  SmallCar car;
+  car.drive(0.0, kFault);
+  car.run = 2;
+  CHECK(car.told("channel.IMU.two_publishers", kFault, kMended) < 0.0);
+  CHECK(car.health.verdict() == Verdict::kOk);
+  CHECK(car.health.report().processes.front().restarts == 1);
+}
+
+TEST_CASE("a dead process is told by its silence, a stopped one by its word") {
+  SmallCar car;
+  car.process = [](double t) { return !faulty(t); };
+  car.drive(0.0, kFault);
+  const double told = car.told("process.imm_fusion.silent", kFault, kMended);
+  CHECK(told > kFault);
+  CHECK(told < kFault + 2.0);  // its last heartbeat was at 9 s
+}
+
+TEST_CASE("what is expected and never comes is named; unexpected absence is not") {
+  Expectations expectations;
+  expectations.channels = {{"CAMERA_LEFT", 20.0}};
+  expectations.processes = {"vo_tracker"};
+  SmallCar car(expectations);
+  car.drive(0.0, kFault);
+  CHECK_THAT(car.reasons(), Catch::Contains("CAMERA_LEFT has not been heard at all (20 per second expected)"));
+  CHECK_THAT(car.reasons(), Catch::Contains("vo_tracker has shown no sign of life"));
+  CHECK(car.health.verdict() == Verdict::kDegraded);
+}
+
+TEST_CASE("without any estimate: do not use, from the first decision on") {
+  SmallCar car;
+  car.arrival = [](const std::string& channel, double, Arrival&) { return !channel.starts_with("POSE_"); };
+  car.drive(0.0, 0.5);
+  CHECK(car.health.verdict() == Verdict::kDoNotUse);
+  CHECK_THAT(car.reasons(), Catch::Contains("nobody publishes POSE_FUSED or POSE_INS"));
+}
+
+TEST_CASE("disk, clock, the monitor's own losses") {
+  SmallCar car;
+  HostFacts host;
+  car.tick = [&](double t) {
+    host.free_disk_gib = faulty(t) ? 0.5 : 50.0;
+    host.clock_step_s = faulty(t) ? -3.2 : 0.0;
+    host.kernel_drops += faulty(t) ? 1 : 0;
+    car.health.host(test::at(t), host);
+  };
+  check_told(car, "host.disk", Verdict::kDegraded);
+  CHECK(car.told("host.clock", 30.0, 31.0) < 0.0);
+  SmallCar again;
+  again.tick = [&](double t) {
+    host.clock_step_s = faulty(t) ? -3.2 : 0.0;
+    again.health.host(test::at(t), host);
+  };
+  check_told(again, "host.clock", Verdict::kDegraded);
+}
+
+TEST_CASE("the same drive gives the same reports") {
+  const auto run = [] {
+    SmallCar car;
+    std::string all;
+    car.arrival = [](const std::string& channel, double t, Arrival& a) {
+      return !(channel == "GNSS" && faulty(t)) && a.seq % 97 != 0;
+    };
+    car.drive(0.0, 20.0, [&](double) { all += car.reasons(); });
+    return all;
+  };
+  const std::string once = run();
+  CHECK(once == run());
+  CHECK_FALSE(once.empty());
+}
