@@ -111,7 +111,7 @@ const PosePair& tie_pair(const std::vector<PosePair>& pairs, const DriveFacts& f
   return after == pairs.begin() || tie_us == INT64_MAX ? pairs.front() : *std::prev(after);
 }
 
-std::optional<Similarity> chosen_similarity(const ChannelReport& report, const DriveFacts& facts,
+std::optional<Similarity> chosen_similarity(const ChannelScore& report, const DriveFacts& facts,
                                             const ReferenceKind& kind, const EvaluationOptions& options) {
   if (report.alignment != Alignment::kTied) return align(report.scored, report.alignment);
   if (!kind.attitude || report.scored.empty()) return std::nullopt;
@@ -120,7 +120,7 @@ std::optional<Similarity> chosen_similarity(const ChannelReport& report, const D
 
 /// The scored pairs as the published covariance means them. An odometry's covariance grows from its own start, so it is
 /// tied to the reference there; the alignment over the whole drive would spread errors to where none are claimed.
-std::vector<PosePair> honest_pairs(const ChannelReport& report, const std::vector<PosePair>& unaligned,
+std::vector<PosePair> honest_pairs(const ChannelScore& report, const std::vector<PosePair>& unaligned,
                                    const Reference& reference, const DriveFacts& facts, const EstimateInput& estimate,
                                    const ReferenceKind& kind) {
   if (!estimate.local_frame || estimate.scale_unknown || !kind.attitude) return report.scored;
@@ -136,7 +136,7 @@ void take_to_reference_point(EstimateInput& estimate) {
   for (Odometry& pose : estimate.trajectory.poses) pose = at_lever_arm(pose, estimate.lever_arm);
 }
 
-void measure_pairs(ChannelReport& report, const ReferenceKind& kind, const EvaluationOptions& options) {
+void measure_pairs(ChannelScore& report, const ReferenceKind& kind, const EvaluationOptions& options) {
   const auto& pairs = report.scored;
   report.pairs = static_cast<int>(pairs.size());
   report.errors = pose_errors(pairs, kind);
@@ -159,7 +159,7 @@ void measure_pairs(ChannelReport& report, const ReferenceKind& kind, const Evalu
   }
 }
 
-void measure_outages(ChannelReport& report, const Reference& reference, const DriveFacts& facts,
+void measure_outages(ChannelScore& report, const Reference& reference, const DriveFacts& facts,
                      const Trajectory& aligned, const ReferenceKind& kind) {
   report.outages = outage_errors(aligned, reference.trajectory, facts.outages, report.errors, kind);
   report.tse_m = transition_stability(report.errors, facts.outages);
@@ -192,11 +192,11 @@ std::pair<int64_t, int64_t> scored_time(const Reference& reference, const DriveF
   return {facts.first_fix_us + skip_us, poses.empty() ? facts.first_fix_us + skip_us : poses.back().t_us};
 }
 
-ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& facts, EstimateInput estimate,
-                               const EvaluationOptions& options) {
+ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& facts, EstimateInput estimate,
+                              const EvaluationOptions& options) {
   const ReferenceKind kind{.attitude = facts.reference.attitude && estimate.trajectory.has_attitude,
                            .velocity = facts.reference.velocity && estimate.trajectory.has_velocity};
-  ChannelReport report;
+  ChannelScore report;
   report.channel = estimate.channel;
   report.poses = static_cast<int>(estimate.trajectory.poses.size());
   report.alignment = options.alignment.value_or(default_alignment(estimate));

@@ -60,7 +60,7 @@ struct PathPoint {
   Validity validity = Validity::kInvalid;
 };
 
-struct ChannelReport {
+struct ChannelScore {
   std::string channel;
   Alignment alignment = Alignment::kNone;
   Similarity similarity;
@@ -95,7 +95,7 @@ struct ChannelReport {
 /// The time that counts: from skip_s after the first fix to the end of the reference.
 std::pair<int64_t, int64_t> scored_time(const Reference& reference, const DriveFacts& facts);
 
-ChannelReport evaluate_channel(const Reference& reference, const DriveFacts& facts, EstimateInput estimate,
-                               const EvaluationOptions& options);
+ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& facts, EstimateInput estimate,
+                              const EvaluationOptions& options);
 
 }  // namespace roadfix

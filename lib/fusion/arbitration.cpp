@@ -28,7 +28,7 @@ Arbitrated printed_arbitration(const PaperPose& wheels, const PaperPose& visual,
   return {mean, true};
 }
 
-void compare(Agreement& a, const AgreementConfig& config, double distance) {
+void compare(AgreementState& a, const AgreementConfig& config, double distance) {
   const bool against = a.agrees ? distance > config.gate : distance < config.clear;
   a.count = against ? a.count + 1 : 0;
   if (a.count < (a.agrees ? config.bad_after : config.good_after)) return;

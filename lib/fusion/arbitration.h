@@ -40,12 +40,12 @@ void visit(AgreementConfig& c, Visitor& v) {
   v.integer("good_after", c.good_after, 1, 10000);
 }
 
-/// Agreement with hysteresis: one outlier does not break it, one lucky comparison does not mend it.
-struct Agreement {
+/// AgreementState with hysteresis: one outlier does not break it, one lucky comparison does not mend it.
+struct AgreementState {
   bool agrees = true;
   int count = 0;  ///< comparisons in a row for a change
 };
-void compare(Agreement& a, const AgreementConfig& config, double squared_distance);
+void compare(AgreementState& a, const AgreementConfig& config, double squared_distance);
 
 /// Mean of two motions weighted by their covariances, and its covariance; the default's counterpart of (15).
 struct WeightedMotion {

@@ -59,7 +59,7 @@ void Fusion::set_gnss(int64_t t_us, bool present) {
 }
 
 FuseStatus Fusion::add(const ChannelSample& s) {
-  ChannelReport& report = reports_[static_cast<std::size_t>(s.channel)];
+  FusionChannelReport& report = reports_[static_cast<std::size_t>(s.channel)];
   report.nis = 0.0;
   report.dof = 0;
   report.gate = config_.gate;
@@ -97,7 +97,8 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   return done(status);
 }
 
-FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Before& before, ChannelReport& report) {
+FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Before& before,
+                        FusionChannelReport& report) {
   const bool ins = s.channel == FusionChannel::kIns;
   const bool placing = ins && !placed_;
   if (placing || config_.scheme == FusionScheme::kLiteral) {

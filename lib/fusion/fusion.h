@@ -33,7 +33,7 @@ struct ChannelSample {
 
 enum class FuseStatus { kAccepted, kGated, kNotReady, kBadInput, kBadQuality, kReset, kDisabled };
 
-struct ChannelReport {
+struct FusionChannelReport {
   FuseStatus status = FuseStatus::kNotReady;
   double weight = 0.0;  ///< share of the information gained lately, [0, 1]
   double alpha = 1.0;   ///< on the channel's own covariance
@@ -95,7 +95,9 @@ class Fusion {
   [[nodiscard]] Odometry fused() const { return carried({}).fused; }
   [[nodiscard]] Odometry local() const { return carried({}).local; }
   [[nodiscard]] FusionReport report() const;
-  [[nodiscard]] const ChannelReport& channel(FusionChannel c) const { return reports_[static_cast<std::size_t>(c)]; }
+  [[nodiscard]] const FusionChannelReport& channel(FusionChannel c) const {
+    return reports_[static_cast<std::size_t>(c)];
+  }
   [[nodiscard]] const Imm& imm() const { return imm_; }
   [[nodiscard]] const FusionEstimate& estimate() const { return now_; }
   [[nodiscard]] const FrameTie& tie() const { return tie_; }
@@ -151,17 +153,18 @@ class Fusion {
   void start(const ChannelSample& sample);
   void place(const Odometry& o);
   void advance(int64_t t_us);
-  FuseStatus fuse(const ChannelSample& sample, const LevelView& view, const Before& before, ChannelReport& report);
-  FuseStatus fuse_literal(const ChannelSample& sample, ChannelReport& report);
-  FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, ChannelReport& report);
+  FuseStatus fuse(const ChannelSample& sample, const LevelView& view, const Before& before,
+                  FusionChannelReport& report);
+  FuseStatus fuse_literal(const ChannelSample& sample, FusionChannelReport& report);
+  FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, FusionChannelReport& report);
   [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
   void follow_velocity_error(const Odometry& ins);
   void fuse_rates(const ChannelSample& sample, const LevelView& view);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
-                       ChannelReport& report);
+                       FusionChannelReport& report);
   [[nodiscard]] bool vision_speaks() const;
-  void apply_gain(const Measurement<3>& gain);
+  void apply_gain(const FusionMeasurement<3>& gain);
   void distrust_velocity(const Planar& difference);
   void give_way(const Planar& difference);
   void remember(const ChannelSample& sample, const LevelView& view);
@@ -175,12 +178,13 @@ class Fusion {
   /// What the modes' innovations were, in the mean.
   template <int M>
   struct Mean {
-    Innovation<M> innovation;
+    FusionInnovation<M> innovation;
     Eigen::Matrix<double, M, 1> difference = Eigen::Matrix<double, M, 1>::Zero();
   };
   template <int M, class At>
   Mean<M> update(const At& at);  ///< at(x): the measurement linearised there
-  static void tell(const Innovation<3>& innovation, const Eigen::Vector3d& difference, ChannelReport& report);
+  static void tell(const FusionInnovation<3>& innovation, const Eigen::Vector3d& difference,
+                   FusionChannelReport& report);
 
   FusionConfig config_;
   bool started_ = false;
@@ -189,7 +193,7 @@ class Fusion {
   Imm imm_;
   FusionEstimate now_;  ///< combined
   std::array<Memory, kFusionChannels> memories_;
-  std::array<ChannelReport, kFusionChannels> reports_;
+  std::array<FusionChannelReport, kFusionChannels> reports_;
   std::array<double, kFusionChannels> information_{};
   double height_ = 0.0;           ///< m
   double height_variance_ = 1.0;  ///< m2
@@ -197,7 +201,7 @@ class Fusion {
   bool gnss_ = false;
   DropoutRamp ramp_;
   FrameTie tie_;
-  Agreement agreement_;
+  AgreementState agreement_;
   std::optional<VisionRestart> restart_;
   std::optional<int64_t> restart_us_;
   std::optional<int64_t> refused_since_us_;

@@ -66,8 +66,8 @@ void clone_pose(FusionEstimate& e, int clone) {
 }
 
 template <int M>
-Innovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
-                            const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
+FusionInnovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
+                                  const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
   if (!R.allFinite()) return {};  // infinite variance tells nothing
   const Eigen::Matrix<double, kSize, M> PH = times_transposed<M>(e.P, H);
   const Eigen::Matrix<double, M, M> S = innovation_covariance<M>(H, PH, R);
@@ -92,18 +92,19 @@ Innovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, kS
 }
 
 template <int M>
-Innovation<M> judge(const FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
-                    const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
+FusionInnovation<M> judge(const FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
+                          const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {
   if (!R.allFinite()) return {};
   const Eigen::Matrix<double, M, M> S = innovation_covariance<M>(H, times_transposed<M>(e.P, H), R);
   return {innovation.dot(S.ldlt().solve(innovation)), 0.0, S.diagonal()};
 }
 
-#define ROADFIX_FUSION_UPDATES(M)                                                                                  \
-  template Innovation<M> kalman_update<M>(FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,                 \
-                                          const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&); \
-  template Innovation<M> judge<M>(const FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,                   \
-                                  const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&);
+#define ROADFIX_FUSION_UPDATES(M)                                                                        \
+  template FusionInnovation<M> kalman_update<M>(FusionEstimate&, const Eigen::Matrix<double, M, kSize>&, \
+                                                const Eigen::Matrix<double, M, 1>&,                      \
+                                                const Eigen::Matrix<double, M, M>&);                     \
+  template FusionInnovation<M> judge<M>(const FusionEstimate&, const Eigen::Matrix<double, M, kSize>&,   \
+                                        const Eigen::Matrix<double, M, 1>&, const Eigen::Matrix<double, M, M>&);
 ROADFIX_FUSION_UPDATES(1)
 ROADFIX_FUSION_UPDATES(2)
 ROADFIX_FUSION_UPDATES(3)

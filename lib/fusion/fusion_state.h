@@ -49,7 +49,7 @@ void clone_pose(FusionEstimate& e, int clone);
 
 /// What one measurement did, or would do.
 template <int M>
-struct Innovation {
+struct FusionInnovation {
   double nis = 0.0;
   double log_likelihood = 0.0;
   Eigen::Matrix<double, M, 1> variance = Eigen::Matrix<double, M, 1>::Zero();
@@ -58,12 +58,12 @@ struct Innovation {
 /// Kalman update for z = h(x) + v; H = dh/dx, innovation = z - h(x), R the covariance of v. Symmetric in P; zero gain
 /// and the same bits where R is infinite.
 template <int M>
-Innovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, fusion::kSize>& H,
-                            const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R);
+FusionInnovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, fusion::kSize>& H,
+                                  const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R);
 
 /// The same without changing e, and without the likelihood: for gates.
 template <int M>
-Innovation<M> judge(const FusionEstimate& e, const Eigen::Matrix<double, M, fusion::kSize>& H,
-                    const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R);
+FusionInnovation<M> judge(const FusionEstimate& e, const Eigen::Matrix<double, M, fusion::kSize>& H,
+                          const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R);
 
 }  // namespace roadfix

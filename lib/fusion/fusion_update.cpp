@@ -34,8 +34,8 @@ Fusion::Mean<M> Fusion::update(const At& at) {
   Mean<M> mean;
   for (std::size_t i = 0; i < kModes; ++i) {
     Mode& mode = imm_.modes[i];
-    const Measurement<M> m = at(mode.estimate.x);
-    const Innovation<M> innovation = kalman_update<M>(mode.estimate, m.H, m.innovation, m.R);
+    const FusionMeasurement<M> m = at(mode.estimate.x);
+    const FusionInnovation<M> innovation = kalman_update<M>(mode.estimate, m.H, m.innovation, m.R);
     mode.log_likelihood += innovation.log_likelihood;
     const double share = imm_.probability(static_cast<Eigen::Index>(i));
     mean.innovation.nis += share * innovation.nis;
@@ -45,7 +45,8 @@ Fusion::Mean<M> Fusion::update(const At& at) {
   return mean;
 }
 
-void Fusion::tell(const Innovation<3>& innovation, const Eigen::Vector3d& difference, ChannelReport& report) {
+void Fusion::tell(const FusionInnovation<3>& innovation, const Eigen::Vector3d& difference,
+                  FusionChannelReport& report) {
   report.nis = innovation.nis;
   report.dof = 3;
   report.innovation = difference;
@@ -102,13 +103,13 @@ void Fusion::follow_velocity_error(const Odometry& ins) {
   last = P;
 }
 
-FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, ChannelReport& report) {
+FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, FusionChannelReport& report) {
   Memory& m = memory(s.channel);
   m.shares_imu = s.shares_imu;
   if (m.last && m.reset_counter != s.reset_counter) {
     m.last.reset();
     if (s.channel == FusionChannel::kVo) {
-      agreement_ = Agreement{};
+      agreement_ = AgreementState{};
       vo_scale_open_ = true;
       tie_.forget();
     }
@@ -144,7 +145,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Ch
   }
   const ChannelSlots where = slots(s.channel);
   if (s.channel == FusionChannel::kVo) {
-    const Measurement<3> at = relative_motion(now_.x, where, motion, dt, R);
+    const FusionMeasurement<3> at = relative_motion(now_.x, where, motion, dt, R);
     tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
     compare(agreement_, config_.agreement, report.nis);
     if (!agreement_.agrees) ask_restart("vision disagrees with wheels and imu");
@@ -164,7 +165,7 @@ void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view) {
   const double lasting = s.channel == FusionChannel::kIns ? 0.0 : s.odometry.cov_velocity(0, 0);
   const double variance = lasting + config_.speed_sigma * config_.speed_sigma;
   update<1>([&](const Vector& x) {
-    Measurement<1> m = absolute_component(x, kSpeed, s.odometry.velocity.x(), std::sqrt(variance));
+    FusionMeasurement<1> m = absolute_component(x, kSpeed, s.odometry.velocity.x(), std::sqrt(variance));
     if (s.channel != FusionChannel::kIns) return m;
     const Eigen::RowVector2d along(std::cos(x(kYaw)), std::sin(x(kYaw)));
     m.H.block<1, 2>(0, kInsVelocity) = along;
@@ -178,13 +179,13 @@ bool Fusion::vision_speaks() const {
 }
 
 FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, const PlanarEstimate& known,
-                             ChannelReport& report) {
+                             FusionChannelReport& report) {
   gain_height(s.odometry);
-  std::optional<Measurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
+  std::optional<FusionMeasurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
   now_ = combine(imm_);
-  const Measurement<3> plain = absolute_pose(now_.x, view.pose, view.P);
+  const FusionMeasurement<3> plain = absolute_pose(now_.x, view.pose, view.P);
   tell(judge<3>(now_, plain.H, plain.innovation, plain.R), plain.innovation, report);
   FuseStatus status = FuseStatus::kAccepted;
   if (report.nis > config_.gate && !vision_speaks()) {
@@ -210,10 +211,10 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
   return status;
 }
 
-void Fusion::apply_gain(const Measurement<3>& gain) {
+void Fusion::apply_gain(const FusionMeasurement<3>& gain) {
   const FusionEstimate before = now_;
   update<3>([&](const Vector& x) {
-    Measurement<3> m = gain;
+    FusionMeasurement<3> m = gain;
     m.innovation += gain.H * difference(before.x, x);
     return m;
   });
@@ -243,7 +244,7 @@ void Fusion::give_way(const Planar& difference) {
   now_ = combine(imm_);
 }
 
-FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
+FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& report) {
   now_ = combine(imm_);
   Memory& m = memory(s.channel);
   const AdaptiveConfig& c = config_.adaptive;
@@ -263,7 +264,7 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, ChannelReport& report) {
   const LevelView view = level_view(o);
   const Eigen::Matrix3d R = scaled_and_clipped(view.P, report.alpha, c);
   const Planar pose = view.pose;
-  const Measurement<3> at = absolute_pose(now_.x, pose, R);
+  const FusionMeasurement<3> at = absolute_pose(now_.x, pose, R);
   tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
   report.gate = c.gate;
   add_nis(m.check, c, report.nis, 3);

@@ -32,8 +32,8 @@ Equivalent equivalent(double d, double p, double p_new) { return {d * p / (p - p
 
 PlanarEstimate planar_estimate(const FusionEstimate& e) { return {e.x.segment<3>(kPos), e.P.block<3, 3>(kPos, kPos)}; }
 
-Measurement<3> absolute_pose(const Vector& x, const Planar& pose, const Eigen::Matrix3d& R) {
-  Measurement<3> m;
+FusionMeasurement<3> absolute_pose(const Vector& x, const Planar& pose, const Eigen::Matrix3d& R) {
+  FusionMeasurement<3> m;
   m.H.middleCols<3>(kPos).setIdentity();
   m.innovation = pose - x.segment<3>(kPos);
   m.innovation.z() = wrap_angle(m.innovation.z());
@@ -41,8 +41,8 @@ Measurement<3> absolute_pose(const Vector& x, const Planar& pose, const Eigen::M
   return m;
 }
 
-Measurement<1> absolute_component(const Vector& x, int index, double value, double sigma) {
-  Measurement<1> m;
+FusionMeasurement<1> absolute_component(const Vector& x, int index, double value, double sigma) {
+  FusionMeasurement<1> m;
   m.H(0, index) = 1.0;
   m.innovation(0) = value - x(index);
   m.R(0, 0) = sigma * sigma;
@@ -56,11 +56,11 @@ Planar predicted_motion(const Vector& x, const ChannelSlots& slots, double dt) {
   return m;
 }
 
-Measurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const Planar& motion, double dt,
-                               const Eigen::Matrix3d& R) {
+FusionMeasurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const Planar& motion, double dt,
+                                     const Eigen::Matrix3d& R) {
   const Planar clone = x.segment<3>(slots.clone), now = seen(x, slots, dt);
   const Planar predicted = predicted_motion(x, slots, dt);
-  Measurement<3> m;
+  FusionMeasurement<3> m;
   m.H.middleCols<3>(kPos) = motion_by_end(clone);
   m.H.middleCols<3>(slots.clone) = motion_by_start(clone, now);
   m.H.topRows<2>() *= length_factor(x, slots);
@@ -73,8 +73,8 @@ Measurement<3> relative_motion(const Vector& x, const ChannelSlots& slots, const
   return m;
 }
 
-std::optional<Measurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
-                                          double least_gain) {
+std::optional<FusionMeasurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose,
+                                                const Eigen::Matrix3d& P_pose, double least_gain) {
   const Eigen::Matrix3d no_gain = P_pose - (1.0 - least_gain) * e.P;
   if (Eigen::LLT<Eigen::Matrix3d>(no_gain).info() == Eigen::Success) return std::nullopt;  // in no direction
   const Eigen::LLT<Eigen::Matrix3d> llt(e.P);
@@ -89,7 +89,7 @@ std::optional<Measurement<3>> gained_pose(const PlanarEstimate& e, const Planar&
   Planar difference = pose - e.pose;
   difference.z() = wrap_angle(difference.z());
   const Eigen::Vector3d d = to_axes * difference;
-  Measurement<3> m;
+  FusionMeasurement<3> m;
   bool gained = false;
   for (int i = 0; i < 3; ++i) {
     const double lambda = std::max(solver.eigenvalues()(i), 1e-12);

@@ -14,7 +14,7 @@ inline constexpr double kUninformative = 1e12;
 
 /// A linearised measurement, ready for kalman_update.
 template <int M>
-struct Measurement {
+struct FusionMeasurement {
   Eigen::Matrix<double, M, fusion::kSize> H = Eigen::Matrix<double, M, fusion::kSize>::Zero();
   Eigen::Matrix<double, M, 1> innovation = Eigen::Matrix<double, M, 1>::Zero();
   Eigen::Matrix<double, M, M> R = Eigen::Matrix<double, M, M>::Zero();
@@ -32,22 +32,22 @@ struct ChannelSlots {
 };
 
 /// Paper C (5), (6): the pose as a pseudo-measurement of position and yaw.
-Measurement<3> absolute_pose(const fusion::Vector& x, const Planar& pose, const Eigen::Matrix3d& R);
+FusionMeasurement<3> absolute_pose(const fusion::Vector& x, const Planar& pose, const Eigen::Matrix3d& R);
 
 /// Paper C (5), (6) of one component.
-Measurement<1> absolute_component(const fusion::Vector& x, int index, double value, double sigma);
+FusionMeasurement<1> absolute_component(const fusion::Vector& x, int index, double value, double sigma);
 
 /// Motion that the state predicts since the clone, as the channel would measure it over dt (F.10).
 Planar predicted_motion(const fusion::Vector& x, const ChannelSlots& slots, double dt);
 
 /// The channel's motion since its clone (F.10), (F.11).
-Measurement<3> relative_motion(const fusion::Vector& x, const ChannelSlots& slots, const Planar& motion, double dt,
-                               const Eigen::Matrix3d& R);
+FusionMeasurement<3> relative_motion(const fusion::Vector& x, const ChannelSlots& slots, const Planar& motion,
+                                     double dt, const Eigen::Matrix3d& R);
 
 /// What `pose` with covariance `P_pose` knows beyond `e`, if all that e knows about absolute position were part of it
 /// (F.13): along the directions in which P_pose is smaller by at least `least_gain`, the measurement that takes e to
 /// the pose and its covariance. kUninformative in the others. Nothing where no direction gained.
-std::optional<Measurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose, const Eigen::Matrix3d& P_pose,
-                                          double least_gain);
+std::optional<FusionMeasurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose,
+                                                const Eigen::Matrix3d& P_pose, double least_gain);
 
 }  // namespace roadfix

@@ -18,14 +18,14 @@ Chord chord(double h) {
 
 }  // namespace
 
-Eigen::Vector3d displacement(const Travel& t, StepForm form) {
+Eigen::Vector3d displacement(const DriveStep& t, StepForm form) {
   const double half = form == StepForm::kArc ? 0.5 * t.yaw_change : 0.0;
   const double direction = t.yaw + half + t.side;
   const double level = t.distance * chord(half).ratio * std::cos(t.pitch);
   return {level * std::cos(direction), level * std::sin(direction), -t.distance * std::sin(t.pitch)};
 }
 
-Eigen::Matrix<double, 3, 5> displacement_jacobian(const Travel& t, StepForm form) {
+Eigen::Matrix<double, 3, 5> displacement_jacobian(const DriveStep& t, StepForm form) {
   const bool arc = form == StepForm::kArc;
   const double half = arc ? 0.5 * t.yaw_change : 0.0;
   const Chord c = chord(half);

@@ -9,7 +9,7 @@ namespace roadfix {
 enum class StepForm { kArc, kEuler };
 
 /// One interval of driving.
-struct Travel {
+struct DriveStep {
   double yaw = 0.0;         ///< rad, at its beginning
   double yaw_change = 0.0;  ///< rad
   double distance = 0.0;    ///< m along the path, negative in reverse
@@ -18,9 +18,9 @@ struct Travel {
 };
 
 /// Displacement in the level frame (M.15); z falls with the nose.
-Eigen::Vector3d displacement(const Travel& travel, StepForm form);
+Eigen::Vector3d displacement(const DriveStep& travel, StepForm form);
 
 /// d displacement / d (yaw, yaw_change, distance, pitch, side), (M.17).
-Eigen::Matrix<double, 3, 5> displacement_jacobian(const Travel& travel, StepForm form);
+Eigen::Matrix<double, 3, 5> displacement_jacobian(const DriveStep& travel, StepForm form);
 
 }  // namespace roadfix

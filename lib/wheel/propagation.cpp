@@ -29,7 +29,7 @@ double speed_change(const WheelVector& x, const WheelStep& step) {
   return (step.accel.x() - x(kAccelBias) + kStandardGravity * std::sin(x(kPitch))) * step.dt;
 }
 
-Travel travel(const WheelVector& x, const WheelStep& step, double yaw_change) {
+DriveStep travel(const WheelVector& x, const WheelStep& step, double yaw_change) {
   // Paper B (10) takes the speed at the interval's beginning; the arc takes the mean.
   const double gained = step.form == StepForm::kArc ? 0.5 * speed_change(x, step) : 0.0;
   return {x(kYaw), yaw_change, (x(kSpeed) + gained) * step.dt, x(kPitch) + x(kClimb), x(kSide)};

@@ -67,7 +67,7 @@ void fill_modes(const Imm& imm, fusion_state_t& m) {
 
 void fill_channels(const Fusion& fusion, fusion_state_t& m) {
   for (int i = 0; i < kFusionChannels; ++i) {
-    const ChannelReport& report = fusion.channel(static_cast<FusionChannel>(i));
+    const FusionChannelReport& report = fusion.channel(static_cast<FusionChannel>(i));
     m.channel_name.emplace_back(kChannelNames[i]);
     m.channel_status.push_back(status_code(report.status));
     m.channel_weight.push_back(report.weight);
@@ -147,7 +147,7 @@ fusion_state_t fusion_state(const Fusion& fusion) {
   return m;
 }
 
-aiding_t aiding(const ChannelSample& sample, const ChannelReport& report) {
+aiding_t aiding(const ChannelSample& sample, const FusionChannelReport& report) {
   aiding_t m{};
   m.measurement_utime = sample.odometry.t_us;
   m.measurement_seq = sample.seq;

@@ -19,7 +19,7 @@ void fill_fused_pose(const Odometry& pose, const FusionReport& report, const std
                      pose_t& m);
 void fill_local_pose(const Odometry& pose, const FusionReport& report, pose_t& m);
 fusion_state_t fusion_state(const Fusion& fusion);
-aiding_t aiding(const ChannelSample& sample, const ChannelReport& report);
+aiding_t aiding(const ChannelSample& sample, const FusionChannelReport& report);
 vo_restart_t vo_restart(const VisionRestart& restart);
 
 }  // namespace roadfix

@@ -115,7 +115,7 @@ void run(const Options& options) {
   const std::string json = report_json(report).dump(2) + "\n";
   write_text(folder / "figures.json", json);
   if (!options.json.empty()) write_text(options.json, json);
-  for (const ChannelReport& c : report.channels) write_text(folder / (c.channel + "_errors.csv"), errors_csv(c));
+  for (const ChannelScore& c : report.channels) write_text(folder / (c.channel + "_errors.csv"), errors_csv(c));
   write_text(folder / "report.html", report_page(report));
   std::cout << report_table(report) << (folder / "report.html").string() << "\n";
 }

@@ -37,5 +37,16 @@ done
 report 'tests draw no unseeded random numbers' < <(grep -rnE --include='*.h' --include='*.cpp' \
   -e 'std::random_device|\bs?rand\(' -e '(Matrix|Vector|Quaternion)[0-9X]*d?(<[^>]*>)?::(Unit)?Random\(' test 2>/dev/null | grep -v '^test/purity/')
 
+# Two types of one qualified name break the one-definition rule as soon as a program links both, and no linker says so.
+report 'one name, one type' < <(find lib processes test \( -name '*.h' -o -name '*.cpp' \) -not -path 'test/purity/*' 2>/dev/null | sort | xargs awk '
+  FNR == 1 { depth = 0 }
+  /^namespace .*\{/ { space[++depth] = $2 == "{" ? "(in " FILENAME ")" : $2; next }
+  /^}  \/\/ namespace/ { if (depth > 0) depth--; next }
+  /^(struct|class|enum|union) [^;]*\{/ {
+    name = $2 == "class" ? $3 : $2
+    for (i = depth; i > 0; i--) name = space[i] "::" name
+    if (name in first) print FILENAME ":" FNR ": " name ", also in " first[name]; else first[name] = FILENAME
+  }')
+
 if [[ $breaches -gt 0 ]]; then echo "$breaches breaches"; exit 1; fi
 echo "pure"

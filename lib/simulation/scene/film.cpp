@@ -13,7 +13,7 @@ const SimulatedDrive& with_camera(const SimulatedDrive& drive) {
   return drive;
 }
 
-std::uint64_t noise_seed(const SimulatedDrive& drive, Eye eye) {
+std::uint64_t noise_seed(const SimulatedDrive& drive, CameraSide eye) {
   return stream_of(drive, NoiseStream::kPicture, static_cast<std::uint64_t>(eye)).bits();
 }
 
@@ -26,7 +26,7 @@ Film::Film(const SimulatedDrive& drive, Executor& executor)
       world_(world_of(drive)),
       scene_(world_),
       renderer_(world_, rig_.camera),
-      noise_seed_{noise_seed(drive, Eye::kLeft), noise_seed(drive, Eye::kRight)} {
+      noise_seed_{noise_seed(drive, CameraSide::kLeft), noise_seed(drive, CameraSide::kRight)} {
   exposure_.time_s = sensor_.exposure.start_s;
 }
 
@@ -37,17 +37,17 @@ bool Film::advance() {
   if (drive_.config.camera.layout == CameraLayout::kStereo)
     renderer_.render(scene_, view_at(drive_, rig_.T_vehicle_right, t_us), executor_, light_[1]);
   if (next_ > 1) exposure_ = next_exposure(sensor_.exposure, sensor_, exposure_, clean_left_);
-  clean_left_ = develop(Eye::kLeft, {});
+  clean_left_ = develop(CameraSide::kLeft, {});
   return true;
 }
 
-GrayImage Film::picture(Eye eye, const PictureEffects& effects) const {
+GrayImage Film::picture(CameraSide eye, const PictureEffects& effects) const {
   const bool clean = effects.light_factor == 1.0 && effects.glare == 0.0 && effects.noise_factor == 1.0 &&
                      effects.occluded_share == 0.0;  // a damaged file is the encoder's
-  return eye == Eye::kLeft && clean ? clean_left_ : develop(eye, effects);
+  return eye == CameraSide::kLeft && clean ? clean_left_ : develop(eye, effects);
 }
 
-GrayImage Film::develop(Eye eye, const PictureEffects& effects) const {
+GrayImage Film::develop(CameraSide eye, const PictureEffects& effects) const {
   const auto k = static_cast<std::size_t>(eye);
   PictureEffects all = effects;
   all.noise_factor *= drive_.config.camera.noise_factor;

@@ -12,7 +12,7 @@
 
 namespace roadfix {
 
-enum class Eye { kLeft, kRight };
+enum class CameraSide { kLeft, kRight };
 
 class Film {
  public:
@@ -25,12 +25,12 @@ class Film {
   // Of the newest exposure, after advance():
   [[nodiscard]] std::size_t taken() const { return next_ - 1; }
   [[nodiscard]] const Exposure& exposure() const { return exposure_; }
-  [[nodiscard]] GrayImage picture(Eye eye, const PictureEffects& effects) const;
+  [[nodiscard]] GrayImage picture(CameraSide eye, const PictureEffects& effects) const;
   /// Light, depth and flow: the truth beside the picture.
-  [[nodiscard]] const LightField& light(Eye eye) const { return light_[static_cast<std::size_t>(eye)]; }
+  [[nodiscard]] const LightField& light(CameraSide eye) const { return light_[static_cast<std::size_t>(eye)]; }
 
  private:
-  [[nodiscard]] GrayImage develop(Eye eye, const PictureEffects& effects) const;
+  [[nodiscard]] GrayImage develop(CameraSide eye, const PictureEffects& effects) const;
 
   const SimulatedDrive& drive_;
   Executor& executor_;

@@ -13,7 +13,7 @@ namespace roadfix {
 struct EvaluationReport {
   DriveFacts facts;
   Reference reference;
-  std::vector<ChannelReport> channels;
+  std::vector<ChannelScore> channels;
   FusionSeries fusion;
   std::vector<std::string> notes;
 };
@@ -28,6 +28,6 @@ nlohmann::ordered_json report_json(const EvaluationReport& report);
 std::string report_page(const EvaluationReport& report);
 
 /// The series behind the plots, one row per scored pose.
-std::string errors_csv(const ChannelReport& channel);
+std::string errors_csv(const ChannelScore& channel);
 
 }  // namespace roadfix

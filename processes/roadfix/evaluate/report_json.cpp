@@ -69,7 +69,7 @@ Json outages_json(const OutageErrors& outages) {
           {"each", std::move(each)}};
 }
 
-void add_relative(const ChannelReport& c, Json& json) {
+void add_relative(const ChannelScore& c, Json& json) {
   if (c.rpe_mean) json["rpe_mean_m"] = *c.rpe_mean;
   if (c.rpe_rmse) {
     json["rpe_rmse"] = {{"delta_samples", c.rpe_rmse->delta},
@@ -85,7 +85,7 @@ void add_relative(const ChannelReport& c, Json& json) {
                    {"translation_percent_by_length_m", std::move(lengths)}};
 }
 
-void add_transitions(const ChannelReport& c, Json& json) {
+void add_transitions(const ChannelScore& c, Json& json) {
   json["outages"] = outages_json(c.outages);
   if (c.tse_m) json["tse_m"] = *c.tse_m;
   if (c.rct) {
@@ -104,7 +104,7 @@ void add_transitions(const ChannelReport& c, Json& json) {
   }
 }
 
-Json channel_json(const ChannelReport& c) {
+Json channel_json(const ChannelScore& c) {
   Json json = {{"alignment", name_of(c.alignment)},
                {"scale", c.similarity.scale},
                {"delay_s", c.delay_s},
@@ -138,7 +138,7 @@ Json channel_json(const ChannelReport& c) {
 nlohmann::ordered_json report_json(const EvaluationReport& report) {
   const auto [begin_us, end_us] = scored_time(report.reference, report.facts);
   Json channels = Json::object();
-  for (const ChannelReport& c : report.channels) channels[c.channel] = channel_json(c);
+  for (const ChannelScore& c : report.channels) channels[c.channel] = channel_json(c);
   return {{"drive",
            {{"name", report.facts.name},
             {"scored_begin_us", begin_us},

@@ -46,7 +46,7 @@ std::vector<std::size_t> peaks(const std::vector<PoseError>& errors) {
   return kept;
 }
 
-Json series_json(const ChannelReport& c, const Clock& clock, bool attitude) {
+Json series_json(const ChannelScore& c, const Clock& clock, bool attitude) {
   Json t = Json::array(), h = Json::array(), nees_position = Json::array(), nees_attitude = Json::array();
   std::vector<Json> error(6, Json::array()), sigma(6, Json::array()), xy(2, Json::array());
   for (const std::size_t i : peaks(c.errors)) {
@@ -86,7 +86,7 @@ Json path_json(const Points& points, const Clock& clock, const Position& positio
   return {{"t", t}, {"x", x}, {"y", y}};
 }
 
-Json channel_plots(const ChannelReport& c, const Clock& clock) {
+Json channel_plots(const ChannelScore& c, const Clock& clock) {
   std::vector<PathPoint> usable;
   for (const PathPoint& point : c.path) {
     if (point.validity != Validity::kInvalid) usable.push_back(point);
@@ -127,7 +127,7 @@ Json plots_json(const EvaluationReport& report) {
     outages.push_back({clock(outage.first_withheld_us), clock(outage.return_us)});
   }
   Json channels = Json::array();
-  for (const ChannelReport& c : report.channels) channels.push_back(channel_plots(c, clock));
+  for (const ChannelScore& c : report.channels) channels.push_back(channel_plots(c, clock));
   return {{"start", iso_time(report.facts.first_fix_us)},
           {"scored", {clock(begin_us), clock(end_us)}},
           {"outages", outages},

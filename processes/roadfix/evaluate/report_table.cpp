@@ -54,7 +54,7 @@ std::string honesty_rows(const Honesty& h) {
   return text;
 }
 
-std::string trajectory_lines(const ChannelReport& c) {
+std::string trajectory_lines(const ChannelScore& c) {
   std::string text =
       fmt::format("  ATE {} m RMSE (evo), {} m mean norm (paper C)", number(c.ate_rmse), number(c.ate_mean));
   text += fmt::format("; after alignment, RMSE:");
@@ -74,7 +74,7 @@ std::string trajectory_lines(const ChannelReport& c) {
   return text;
 }
 
-std::string outage_lines(const ChannelReport& c) {
+std::string outage_lines(const ChannelScore& c) {
   std::string text;
   const OutageErrors& o = c.outages;
   if (!o.each.empty() || o.missing > 0) {
@@ -97,7 +97,7 @@ std::string outage_lines(const ChannelReport& c) {
   return text;
 }
 
-std::string channel_text(const ChannelReport& c) {
+std::string channel_text(const ChannelScore& c) {
   std::string text = fmt::format("{}  alignment: {}", c.channel, name_of(c.alignment));
   if (c.alignment == Alignment::kSim3) text += fmt::format(", scale {}", number(c.similarity.scale));
   if (c.delay_s != 0.0) text += fmt::format(", reference {:.3f} s late (fitted)", c.delay_s);
@@ -126,7 +126,7 @@ std::string head(const EvaluationReport& report) {
 std::string overview(const EvaluationReport& report) {
   std::string text = fmt::format("{:<14}{:>9}{:>13}{:>11}{:>11}{:>11}{:>11}{:>10}\n", "channel", "aligned",
                                  "horizontal m", "95 % m", "vertical m", "yaw deg", "in 3 s", "usable");
-  for (const ChannelReport& c : report.channels) {
+  for (const ChannelScore& c : report.channels) {
     const bool any = c.pairs > 0;
     text += fmt::format("{:<14}{:>9}{:>13}{:>11}{:>11}{:>11}{:>11}{:>10}\n", c.channel, name_of(c.alignment),
                         any ? number(c.axes.horizontal.rms) : "-", any ? number(c.axes.horizontal.p95) : "-",
@@ -138,7 +138,7 @@ std::string overview(const EvaluationReport& report) {
   return text;
 }
 
-std::string aligned_mean(const ChannelReport& c, Alignment alignment) {
+std::string aligned_mean(const ChannelScore& c, Alignment alignment) {
   for (const AlignedAte& a : c.ate_by_alignment)
     if (a.alignment == alignment) return number(a.mean);
   return "-";
@@ -149,7 +149,7 @@ std::string aligned_mean(const ChannelReport& c, Alignment alignment) {
 std::string paper_tables(const EvaluationReport& report) {
   std::string text = fmt::format("\n{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", "paper C", "ATE mean m",
                                  "ATE sim3 m", "RPE m", "TSE m", "RCT s", "MPA %", "balanced %", "always CA %");
-  for (const ChannelReport& c : report.channels) {
+  for (const ChannelScore& c : report.channels) {
     const auto share = [](double value) { return fmt::format("{:.1f}", value); };
     const std::string published = c.alignment == Alignment::kNone && c.pairs > 0 ? number(c.ate_mean) : "-";
     text += fmt::format("{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", c.channel, published,
@@ -165,11 +165,11 @@ std::string paper_tables(const EvaluationReport& report) {
 
 std::string report_table(const EvaluationReport& report) {
   std::string text = head(report);
-  for (const ChannelReport& c : report.channels) text += channel_text(c);
+  for (const ChannelScore& c : report.channels) text += channel_text(c);
   return text + paper_tables(report) + "\n" + overview(report);
 }
 
-std::string errors_csv(const ChannelReport& channel) {
+std::string errors_csv(const ChannelScore& channel) {
   std::string text =
       "utime_us,longitudinal_m,lateral_m,vertical_m,roll_deg,pitch_deg,yaw_deg,std_longitudinal_m,std_lateral_m,"
       "std_vertical_m,std_roll_deg,std_pitch_deg,std_yaw_deg\n";

@@ -46,7 +46,7 @@ struct EventList {
                       }});
   }
 
-  void add_pictures(const std::string& name, Eye eye, const std::vector<Delivery>& deliveries,
+  void add_pictures(const std::string& name, CameraSide eye, const std::vector<Delivery>& deliveries,
                     SimulatedPictures& pictures) {
     if (deliveries.empty()) return;
     begin_channel(name);
@@ -219,8 +219,8 @@ std::string write_simulated_log(const SimulatedDrive& drive, const std::filesyst
   list.begin_channel("CONFIG_DRIVE");
   list.add<config_t>(drive.config.start_utime, 0, [&] { return config_message(drive); });
   if (pictures) {
-    list.add_pictures("CAMERA_LEFT", Eye::kLeft, drive.deliveries.camera_left, *pictures);
-    list.add_pictures("CAMERA_RIGHT", Eye::kRight, drive.deliveries.camera_right, *pictures);
+    list.add_pictures("CAMERA_LEFT", CameraSide::kLeft, drive.deliveries.camera_left, *pictures);
+    list.add_pictures("CAMERA_RIGHT", CameraSide::kRight, drive.deliveries.camera_right, *pictures);
   }
   list.add_sensor<gnss_t>("GNSS", drive.gnss, drive.deliveries.gnss);
   list.add_sensor<imu_t>("IMU", drive.imu, drive.deliveries.imu);

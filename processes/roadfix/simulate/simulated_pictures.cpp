@@ -39,20 +39,20 @@ SimulatedPictures::SimulatedPictures(const SimulatedDrive& drive, Executor& exec
                                      std::function<void(std::size_t)> progress)
     : drive_(drive), executor_(executor), progress_(std::move(progress)), film_(drive, executor) {}
 
-const std::vector<Picture>& SimulatedPictures::pictures(Eye eye) const {
-  return eye == Eye::kLeft ? drive_.pictures_left : drive_.pictures_right;
+const std::vector<Picture>& SimulatedPictures::pictures(CameraSide eye) const {
+  return eye == CameraSide::kLeft ? drive_.pictures_left : drive_.pictures_right;
 }
 
 void SimulatedPictures::advance() {
   if (!film_.advance()) throw std::logic_error("simulate: a picture of an exposure that there is not");
   struct Job {
-    Eye eye;
+    CameraSide eye;
     std::size_t index;
     GrayImage pixels;
     image_t message;
   };
   std::vector<Job> jobs;
-  for (const Eye eye : {Eye::kLeft, Eye::kRight}) {
+  for (const CameraSide eye : {CameraSide::kLeft, CameraSide::kRight}) {
     std::size_t& next = next_[static_cast<std::size_t>(eye)];
     for (; next < pictures(eye).size() && pictures(eye)[next].exposure == film_.taken(); ++next)
       jobs.push_back({eye, next, film_.picture(eye, pictures(eye)[next].effects), {}});
@@ -73,7 +73,7 @@ void SimulatedPictures::advance() {
   progress_(film_.taken() + 1);
 }
 
-image_t SimulatedPictures::take(Eye eye, std::size_t index) {
+image_t SimulatedPictures::take(CameraSide eye, std::size_t index) {
   auto& ready = ready_[static_cast<std::size_t>(eye)];
   while (ready.find(index) == ready.end()) advance();
   return std::move(ready.extract(index).mapped());

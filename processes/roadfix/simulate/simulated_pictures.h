@@ -18,11 +18,11 @@ class SimulatedPictures {
   SimulatedPictures(const SimulatedDrive& drive, Executor& executor, std::function<void(std::size_t)> progress);
 
   /// The message of drive.pictures_left[index] or pictures_right[index], without run and seq; each is given once.
-  image_t take(Eye eye, std::size_t index);
+  image_t take(CameraSide eye, std::size_t index);
 
  private:
   void advance();
-  [[nodiscard]] const std::vector<Picture>& pictures(Eye eye) const;
+  [[nodiscard]] const std::vector<Picture>& pictures(CameraSide eye) const;
 
   const SimulatedDrive& drive_;
   Executor& executor_;

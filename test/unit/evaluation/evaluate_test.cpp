@@ -32,7 +32,7 @@ EstimateInput estimate_of(Trajectory trajectory) {
 }
 
 TEST_CASE("a perfect estimate scores zero everywhere and is there all the time") {
-  const ChannelReport report =
+  const ChannelScore report =
       evaluate_channel(exact_reference(), exact_facts(), estimate_of(eight_trajectory(0.0, 200.0, 0.01)), {});
   CHECK(report.pairs == 2001);
   CHECK(report.ate_rmse < 1e-9);
@@ -50,7 +50,7 @@ TEST_CASE("nothing before skip_s is scored") {
   const Trajectory late = changed(eight_trajectory(0.0, 200.0, 0.01), [](Odometry& pose) {
     if (pose.t_us < 45 * kSecond) pose.T_frame_vehicle.p.x() += 100.0;
   });
-  const ChannelReport report = evaluate_channel(exact_reference(), facts, estimate_of(late), {});
+  const ChannelScore report = evaluate_channel(exact_reference(), facts, estimate_of(late), {});
   CHECK(report.axes.norm.max < 1e-9);
   CHECK(report.scored.front().reference.t_us == 45 * kSecond);
   facts.score.skip_s = 39.0;
@@ -65,7 +65,7 @@ TEST_CASE("references of a fix type that does not count are not scored") {
   }
   DriveFacts facts = exact_facts();
   facts.reference.from_fixes = true;
-  const ChannelReport report = evaluate_channel(reference, facts, estimate_of(eight_trajectory(0.0, 200.0, 0.01)), {});
+  const ChannelScore report = evaluate_channel(reference, facts, estimate_of(eight_trajectory(0.0, 200.0, 0.01)), {});
   CHECK(report.pairs == 1901);
   CHECK(report.axes.norm.max < 1e-9);
 }
@@ -81,7 +81,7 @@ TEST_CASE("where fixes were thinned out the withheld ones alone are scored") {
   facts.reference.from_fixes = true;
   CHECK(evaluate_channel(reference, facts, estimate_of(cheat), {}).axes.norm.rms < 0.9);
   facts.score_withheld_only = true;
-  const ChannelReport report = evaluate_channel(reference, facts, estimate_of(cheat), {});
+  const ChannelScore report = evaluate_channel(reference, facts, estimate_of(cheat), {});
   CHECK(report.axes.norm.rms == Approx(1.0));
   CHECK(report.pairs == 600);
 }
@@ -112,7 +112,7 @@ TEST_CASE("an estimate in its own frame is aligned by yaw and one without scale 
   estimate.local_frame = true;
   CHECK(evaluate_channel(exact_reference(), exact_facts(), estimate, {}).ate_rmse > 10.0);
   estimate.scale_unknown = true;
-  const ChannelReport report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
+  const ChannelScore report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
   CHECK(report.alignment == Alignment::kSim3);
   CHECK(report.similarity.scale == Approx(5.0));
   CHECK(report.ate_rmse < 1e-8);
@@ -130,7 +130,7 @@ TEST_CASE("a tied odometry starts from the reference and shows its own drift fro
   facts.outages = {{100 * kSecond, 150 * kSecond, 151 * kSecond}};
   EvaluationOptions options;
   options.alignment = Alignment::kTied;
-  ChannelReport report = evaluate_channel(exact_reference(), facts, estimate, options);
+  ChannelScore report = evaluate_channel(exact_reference(), facts, estimate, options);
   CHECK(report.outages.each.at(0).vertical_m == Approx(0.5));
   CHECK(report.outages.each.at(0).horizontal_m < 1e-9);
   options.tie_us = 150 * kSecond;
@@ -149,7 +149,7 @@ TEST_CASE("an odometry's covariance is judged from its own start") {
     pose.cov_pose.diagonal() << 1e-6, 1e-6, grown * grown, 1e-8, 1e-8, 1e-8;
   }));
   estimate.local_frame = true;
-  const ChannelReport report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
+  const ChannelScore report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
   CHECK(report.alignment == Alignment::kYaw);
   CHECK(report.honesty.position.nees_per_dof == Approx(1.0 / 3.0).epsilon(0.02));
   CHECK(report.honesty.position.within_3sigma == Approx(1.0));
@@ -168,7 +168,7 @@ TEST_CASE("a constant latency of the reference is found where it is asked for") 
   EvaluationOptions options;
   CHECK(evaluate_channel(reference, facts, estimate, options).ate_rmse > 1.0);
   options.fit_delay = true;
-  const ChannelReport report = evaluate_channel(reference, facts, estimate, options);
+  const ChannelScore report = evaluate_channel(reference, facts, estimate, options);
   CHECK(report.delay_s == Approx(0.43).margin(2e-4));
   CHECK(report.ate_rmse < 5e-3);
 }
@@ -191,7 +191,7 @@ TEST_CASE("availability tells valid, coasting, invalid and silent") {
 }
 
 TEST_CASE("without an estimate everything is silent and nothing is scored") {
-  const ChannelReport report = evaluate_channel(exact_reference(), exact_facts(), estimate_of({}), {});
+  const ChannelScore report = evaluate_channel(exact_reference(), exact_facts(), estimate_of({}), {});
   CHECK(report.pairs == 0);
   CHECK(report.availability.silent == Approx(1.0));
 }

@@ -23,7 +23,7 @@ void step(Imm& imm, const Planar& pose) {
   mix(imm, mode_transition(0.1, {10.0, 4.0}));
   predict(imm, MotionNoise{}, 0.1);
   for (Mode& mode : imm.modes) {
-    const Measurement<3> m = absolute_pose(mode.estimate.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
+    const FusionMeasurement<3> m = absolute_pose(mode.estimate.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
     mode.log_likelihood += kalman_update<3>(mode.estimate, m.H, m.innovation, m.R).log_likelihood;
   }
   reweigh(imm);
@@ -55,7 +55,7 @@ TEST_CASE("an IMM of equal models is one filter, to the bit") {
   for (const Planar& pose : turning_car()) {
     step(imm, pose);
     move(single, MotionKind::kConstantTurn, MotionNoise{}, 0.1);
-    const Measurement<3> m = absolute_pose(single.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
+    const FusionMeasurement<3> m = absolute_pose(single.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
     (void)kalman_update<3>(single, m.H, m.innovation, m.R);
   }
   CHECK(combine(imm).x == single.x);
@@ -71,7 +71,8 @@ TEST_CASE("permuted models give permuted output") {
       mix(*imm, T);
       predict(*imm, MotionNoise{}, 0.1);
       for (Mode& mode : imm->modes) {
-        const Measurement<3> m = absolute_pose(mode.estimate.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
+        const FusionMeasurement<3> m =
+            absolute_pose(mode.estimate.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
         mode.log_likelihood += kalman_update<3>(mode.estimate, m.H, m.innovation, m.R).log_likelihood;
       }
       reweigh(*imm);
@@ -116,7 +117,7 @@ TEST_CASE("a car that turns is told from one that does not") {
       mix(imm, mode_transition(0.05, {10.0, 4.0}));
       predict(imm, MotionNoise{}, 0.05);
       for (Mode& mode : imm.modes) {
-        const Measurement<1> m = absolute_component(mode.estimate.x, kTurn, turn, 0.01);
+        const FusionMeasurement<1> m = absolute_component(mode.estimate.x, kTurn, turn, 0.01);
         mode.log_likelihood += kalman_update<1>(mode.estimate, m.H, m.innovation, m.R).log_likelihood;
       }
       reweigh(imm);

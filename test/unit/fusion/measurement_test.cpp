@@ -31,7 +31,7 @@ TEST_CASE("Jacobian of the relative motion, scale and drift included") {
         return Eigen::Vector3d(
             -relative_motion(plus(x, d), slots, motion, 0.3, Eigen::Matrix3d::Identity()).innovation);
       };
-      const Measurement<3> m = relative_motion(x, slots, motion, 0.3, Eigen::Matrix3d::Identity());
+      const FusionMeasurement<3> m = relative_motion(x, slots, motion, 0.3, Eigen::Matrix3d::Identity());
       CHECK((m.H - test::numerical_jacobian<3, kSize>(h, 1e-5)).cwiseAbs().maxCoeff() < 1e-7);
     }
   }
@@ -59,8 +59,8 @@ TEST_CASE("a cloned pose is correlated as the pose is, and moves with it") {
   CHECK(e.P.block<3, 3>(kVoClone, kPos) == e.P.block<3, 3>(kPos, kPos));
   // Their difference is exactly known, so measuring "no motion" tells nothing of the place.
   const FusionEstimate before = e;
-  const Measurement<3> m = relative_motion(e.x, {kVoClone, std::nullopt, std::nullopt, std::nullopt}, Planar::Zero(),
-                                           0.1, 1e-4 * Eigen::Matrix3d::Identity());
+  const FusionMeasurement<3> m = relative_motion(e.x, {kVoClone, std::nullopt, std::nullopt, std::nullopt},
+                                                 Planar::Zero(), 0.1, 1e-4 * Eigen::Matrix3d::Identity());
   (void)kalman_update<3>(e, m.H, m.innovation, m.R);
   CHECK((e.P - before.P).norm() < 1e-9);
 }
@@ -106,7 +106,7 @@ TEST_CASE("infinite variance has no effect, to the bit") {
   Draws draws(5);
   FusionEstimate e = random_estimate(draws);
   const FusionEstimate before = e;
-  Measurement<3> m = absolute_pose(e.x, {5.0, 5.0, 1.0}, Eigen::Matrix3d::Identity());
+  FusionMeasurement<3> m = absolute_pose(e.x, {5.0, 5.0, 1.0}, Eigen::Matrix3d::Identity());
   m.R.diagonal().setConstant(std::numeric_limits<double>::infinity());
   CHECK(kalman_update<3>(e, m.H, m.innovation, m.R).log_likelihood == 0.0);
   CHECK(e.x == before.x);

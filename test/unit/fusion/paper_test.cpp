@@ -101,7 +101,7 @@ TEST_CASE("paper B's mean and fall-back") {
 
 TEST_CASE("agreement has hysteresis") {
   const AgreementConfig c{16.3, 3, 7.8, 4};
-  Agreement a;
+  AgreementState a;
   for (const double d : {100.0, 100.0, 1.0, 100.0, 100.0}) compare(a, c, d);
   CHECK(a.agrees);
   compare(a, c, 100.0);

@@ -37,8 +37,8 @@ std::vector<Frame> frames_of(const ScenarioConfig& config, std::uint64_t seed, i
       if (film.taken() == drive.pictures_left[i].exposure) break;
     }
     Frame f{seconds_between(config.start_utime, drive.exposures[film.taken()]), {}, {}, film.exposure()};
-    f.left = film.picture(Eye::kLeft, drive.pictures_left[i].effects);
-    if (!drive.pictures_right.empty()) f.right = film.picture(Eye::kRight, drive.pictures_right[i].effects);
+    f.left = film.picture(CameraSide::kLeft, drive.pictures_left[i].effects);
+    if (!drive.pictures_right.empty()) f.right = film.picture(CameraSide::kRight, drive.pictures_right[i].effects);
     frames.push_back(std::move(f));
   }
   return frames;
@@ -90,8 +90,8 @@ TEST_CASE("the right eye sees the left one's points shifted by the disparity") {
   Film film(drive, executor);
   for (int i = 0; i < 3; ++i) REQUIRE(film.advance());
   CHECK_FALSE(film.advance());
-  const LightField& left = film.light(Eye::kLeft);
-  const LightField& right = film.light(Eye::kRight);
+  const LightField& left = film.light(CameraSide::kLeft);
+  const LightField& right = film.light(CameraSide::kRight);
   int same = 0;
   int all = 0;
   for (int v = 0; v < 64; ++v) {

@@ -60,8 +60,8 @@ TEST_CASE("PNG pictures of the log are the film's, bit for bit, and JPEG ones ar
   REQUIRE(jpeg.at("CAMERA_LEFT").size() == 25);
   for (std::size_t i = 0; i < 25; ++i) {
     REQUIRE(film.advance());
-    for (const Eye eye : {Eye::kLeft, Eye::kRight}) {
-      const char* channel = eye == Eye::kLeft ? "CAMERA_LEFT" : "CAMERA_RIGHT";
+    for (const CameraSide eye : {CameraSide::kLeft, CameraSide::kRight}) {
+      const char* channel = eye == CameraSide::kLeft ? "CAMERA_LEFT" : "CAMERA_RIGHT";
       const image_t& exact = png.at(channel)[i].image;
       const GrayImage truth = film.picture(eye, {});
       CHECK(exact.utime == drive.exposures[i]);

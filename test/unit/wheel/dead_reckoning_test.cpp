@@ -42,7 +42,7 @@ TEST_CASE("the arc is exact on a circle; Euler's step errs with the first power 
 }
 
 TEST_CASE("without a turn both forms agree") {
-  const Travel straight{0.3, 0.0, 5.0, 0.05, 0.01};
+  const DriveStep straight{0.3, 0.0, 5.0, 0.05, 0.01};
   CHECK((displacement(straight, StepForm::kArc) - displacement(straight, StepForm::kEuler)).norm() < 1e-15);
 }
 
@@ -63,8 +63,8 @@ TEST_CASE("Jacobian of the displacement") {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (int i = 0; i < 21; ++i) {
     const double turn = i == 0 ? 0.0 : (i == 1 ? 1e-6 : uniform(generator));
-    const Travel t{3.0 * uniform(generator), turn, 3.0 * uniform(generator), 0.3 * uniform(generator),
-                   0.1 * uniform(generator)};
+    const DriveStep t{3.0 * uniform(generator), turn, 3.0 * uniform(generator), 0.3 * uniform(generator),
+                      0.1 * uniform(generator)};
     for (const StepForm form : {StepForm::kArc, StepForm::kEuler}) {
       const auto f = [&](const Eigen::Matrix<double, 5, 1>& d) {
         return displacement({t.yaw + d(0), t.yaw_change + d(1), t.distance + d(2), t.pitch + d(3), t.side + d(4)},
