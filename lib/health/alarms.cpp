@@ -10,12 +10,13 @@ Alarms::Alarms(const AlarmConfig& config)
     : raise_us_(std::llround(config.raise_after * 1e6)), clear_us_(std::llround(config.clear_after * 1e6)) {}
 
 bool Alarms::update(int64_t now_us, const std::vector<Condition>& seen) {
-  if (since_us_ == 0) since_us_ = now_us;
+  const bool first_look = since_us_ == 0;
+  if (first_look) since_us_ = now_us;
   for (const Condition& condition : seen) {
     Entry& entry = entries_.try_emplace(condition.key, Entry{condition, now_us, now_us, false}).first->second;
     entry.condition = condition;
     entry.last_us = now_us;
-    entry.told = entry.told || now_us - entry.first_us >= raise_us_;
+    entry.told = entry.told || first_look || now_us - entry.first_us >= raise_us_;
   }
   std::erase_if(entries_, [&](const auto& item) {
     const Entry& entry = item.second;

@@ -1,4 +1,5 @@
-/// Hysteresis: conditions come and go with every look; what is told does not flicker.
+/// Hysteresis: conditions come and go with every look; what is told does not flicker. The first look counts at once:
+/// before it nothing is known to be well.
 #pragma once
 
 #include <cstdint>

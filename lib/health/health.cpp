@@ -42,20 +42,21 @@ void Health::heartbeat(const std::string& process, int64_t now_us, const Heartbe
   processes_.try_emplace(process, process, config_.process).first->second.heartbeat(now_us, facts);
 }
 
-/// All absolute poses are kept in the frame of the first one heard.
+void Health::to_common_frame(PoseFacts& facts) {
+  if (!facts.anchor) return;
+  offer_anchor(*facts.anchor);
+  if (same_anchor(*facts.anchor, *anchor_)) return;
+  const SE3 change = T_enu_enu(*anchor_, *facts.anchor);
+  facts.anchor = anchor_;
+  facts.odometry.T_frame_vehicle = change * facts.odometry.T_frame_vehicle;
+  const Eigen::Matrix3d R = change.R();
+  Matrix6d& P = facts.odometry.cov_pose;
+  P.topRows<3>() = (R * P.topRows<3>()).eval();
+  P.leftCols<3>() = (P.leftCols<3>() * R.transpose()).eval();
+}
+
 void Health::pose(const std::string& name, int64_t now_us, PoseFacts facts) {
-  if (facts.anchor) {
-    if (!anchor_) anchor_ = facts.anchor;
-    if (!same_anchor(*facts.anchor, *anchor_)) {
-      const SE3 change = T_enu_enu(*anchor_, *facts.anchor);
-      SE3& T = facts.odometry.T_frame_vehicle;
-      T = change * T;
-      const Eigen::Matrix3d R = change.q.toRotationMatrix();
-      Matrix6d& P = facts.odometry.cov_pose;
-      P.topRows<3>() = (R * P.topRows<3>()).eval();
-      P.leftCols<3>() = (P.leftCols<3>() * R.transpose()).eval();
-    }
-  }
+  to_common_frame(facts);
   poses_.try_emplace(name, name, config_.pose).first->second.seen(now_us, facts);
 }
 
@@ -159,6 +160,7 @@ HealthReport Health::report() const {
   report.lag_s = static_cast<double>(lag_us_) * 1e-6;
   for (const auto& [name, watch] : channels_) report.channels.push_back(watch.report(decided_us_, lag_us_));
   for (const auto& [name, watch] : processes_) report.processes.push_back(watch.report(decided_us_));
+  for (const auto& [name, watch] : poses_) report.poses.push_back(watch.report());
   for (const auto& [name, watch] : sources_) report.consistency.push_back(watch.report(decided_us_));
   report.agreements = agreements();
   return report;

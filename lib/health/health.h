@@ -36,6 +36,7 @@ struct HealthReport {
   double lag_s = 0.0;       ///< of a drive that is played again: how old its stamps are
   std::vector<ChannelReport> channels;
   std::vector<ProcessReport> processes;
+  std::vector<PoseReport> poses;
   std::vector<NisReport> consistency;
   std::vector<Agreement> agreements;
 };
@@ -62,8 +63,13 @@ class Health {
   [[nodiscard]] Verdict verdict() const { return alarms_.verdict(); }
   [[nodiscard]] HealthReport report() const;  ///< of the last decision
   [[nodiscard]] const std::map<std::string, PoseWatch>& poses() const { return poses_; }
-  /// Of the frame that absolute poses are given in here: the first one heard.
+  /// Of the frame that absolute poses are kept in here: the first one offered or heard.
   [[nodiscard]] const std::optional<Geodetic>& anchor() const { return anchor_; }
+  void offer_anchor(const Geodetic& anchor) {
+    if (!anchor_) anchor_ = anchor;
+  }
+  /// Takes an absolute pose into that frame.
+  void to_common_frame(PoseFacts& facts);
 
  private:
   ChannelWatch& channel(const std::string& name);

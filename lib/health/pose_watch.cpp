@@ -25,7 +25,7 @@ bool finite(const Odometry& o) {
 /// A covariance that no estimate can have.
 bool impossible(const Odometry& o) { return o.cov_pose.diagonal().minCoeff() < 0.0; }
 
-double yaw_std_deg(const Odometry& o) { return std::sqrt(std::max(0.0, o.cov_pose(5, 5))) / kDegree; }
+double yaw_std(const Odometry& o) { return std::sqrt(std::max(0.0, o.cov_pose(5, 5))); }
 
 }  // namespace
 
@@ -137,10 +137,23 @@ void PoseWatch::judge_numbers(bool judged, std::vector<Condition>& out) const {
     const Verdict verdict = sigma > limits_.position_std_unusable ? Verdict::kDoNotUse : Verdict::kDegraded;
     out.push_back(condition("position_std", verdict, fmt::format("knows its place only to {:.1f} m", sigma)));
   }
-  if (const double yaw = yaw_std_deg(o); yaw > limits_.yaw_std_degraded_deg) {
+  if (const double yaw = yaw_std(o) / kDegree; yaw > limits_.yaw_std_degraded_deg) {
     const Verdict verdict = yaw > limits_.yaw_std_unusable_deg ? Verdict::kDoNotUse : Verdict::kDegraded;
     out.push_back(condition("yaw_std", verdict, fmt::format("knows its heading only to {:.0f} degrees", yaw)));
   }
+}
+
+PoseReport PoseWatch::report() const {
+  PoseReport report;
+  report.name = name_;
+  if (!newest_) return report;
+  const Odometry& o = newest_->odometry;
+  report.validity = finite(o) ? o.validity : Validity::kInvalid;
+  report.reason = newest_->reason;
+  report.position_std = horizontal_ellipse(o.cov_pose.topLeftCorner<2, 2>()).major;
+  report.yaw_std = yaw_std(o);
+  report.speed = o.velocity.x();
+  return report;
 }
 
 }  // namespace roadfix

@@ -32,6 +32,15 @@ struct HorizontalEllipse {
 /// Of the covariance of x and y; zero where it is not finite.
 HorizontalEllipse horizontal_ellipse(const Eigen::Matrix2d& covariance);
 
+struct PoseReport {
+  std::string name;
+  Validity validity = Validity::kInvalid;
+  std::string reason;
+  double position_std = 0.0;  ///< m, horizontal, along the worst direction
+  double yaw_std = 0.0;       ///< rad
+  double speed = 0.0;         ///< m/s, forward
+};
+
 class PoseWatch {
  public:
   PoseWatch(const std::string& name, const PoseLimits& limits) : name_(name), limits_(limits) {}
@@ -41,6 +50,8 @@ class PoseWatch {
 
   /// `judged`: this is the estimate that the verdict is about.
   void judge(int64_t now_us, bool judged, std::vector<Condition>& out) const;
+
+  [[nodiscard]] PoseReport report() const;
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::optional<PoseFacts>& newest() const { return newest_; }

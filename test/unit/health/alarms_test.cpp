@@ -14,6 +14,7 @@ const Condition kDead{"dead", Verdict::kDoNotUse, kRankPose, "dead"};
 
 TEST_CASE("a condition of one look is not told, one of two is") {
   Alarms alarms({0.1, 0.7});
+  CHECK_FALSE(alarms.update(9 * kTenth, {}));
   CHECK_FALSE(alarms.update(10 * kTenth, {kLate}));
   CHECK_FALSE(alarms.update(11 * kTenth, {}));
   CHECK_FALSE(alarms.update(12 * kTenth, {kLate}));
@@ -40,6 +41,12 @@ TEST_CASE("a flickering condition is told once and stays") {
     changes += nervous.update(i * kTenth, there ? std::vector{kLate} : std::vector<Condition>{}) ? 1 : 0;
   }
   CHECK(changes > 20);
+}
+
+TEST_CASE("what is wrong at the first look is told at once") {
+  Alarms alarms({0.1, 0.7});
+  CHECK(alarms.update(1 * kTenth, {kDead}));
+  CHECK(alarms.verdict() == Verdict::kDoNotUse);
 }
 
 TEST_CASE("what is over is forgotten after its time") {

@@ -1,0 +1,43 @@
+#include "monitor/health_publisher.h"
+
+#include <cmath>
+
+#include "bus/message.h"
+#include "monitor/messages.h"
+
+namespace roadfix {
+
+namespace {
+constexpr int64_t kHeartbeat_us = 1'000'000;
+}
+
+HealthPublisher::HealthPublisher(Bus& bus, double period_s, bool heartbeat)
+    : bus_(bus), period_us_(std::llround(period_s * 1e6)), heartbeat_(heartbeat) {}
+
+void HealthPublisher::decided(const HealthReport& report, bool changed) {
+  if (run_ == 0) run_ = report.now_us;
+  if (changed || report.now_us - published_us_ >= period_us_) {
+    published_us_ = report.now_us;
+    health_t message = health_message(report);
+    message.utime = report.now_us;
+    message.run = run_;
+    message.seq = seq_++;
+    bus_.publish("HEALTH", encode(message));
+  }
+  if (heartbeat_ && report.now_us - heartbeat_us_ >= kHeartbeat_us) publish_heartbeat(report.now_us);
+}
+
+void HealthPublisher::publish_heartbeat(int64_t now_us) {
+  heartbeat_us_ = now_us;
+  heartbeat_t heartbeat{};
+  heartbeat.utime = now_us;
+  heartbeat.run = run_;
+  heartbeat.seq = heartbeat_seq_++;
+  heartbeat.state = heartbeat_t::STATE_RUNNING;
+  heartbeat.cpu_share = load_.cpu_share();
+  heartbeat.rss_bytes = resident_bytes();
+  heartbeat.kernel_drops = bus_.kernel_drops();
+  bus_.publish("HEARTBEAT_MONITOR", encode(heartbeat));
+}
+
+}  // namespace roadfix

@@ -1,0 +1,30 @@
+/// HEALTH and HEARTBEAT_MONITOR onto a bus.
+#pragma once
+
+#include "bus/bus.h"
+#include "bus/process_facts.h"
+#include "monitor/handler.h"
+
+namespace roadfix {
+
+class HealthPublisher : public MonitorListener {
+ public:
+  /// `heartbeat`: false where a log is read; nothing lives there.
+  HealthPublisher(Bus& bus, double period_s, bool heartbeat);
+
+  void message(const std::string&, const std::string&, const BusMessage&, int64_t) override {}
+  void decided(const HealthReport& report, bool changed) override;
+
+ private:
+  void publish_heartbeat(int64_t now_us);
+
+  Bus& bus_;
+  int64_t period_us_;
+  bool heartbeat_;
+  ProcessLoad load_;
+  int64_t run_ = 0;
+  int64_t seq_ = 0, heartbeat_seq_ = 0;
+  int64_t published_us_ = 0, heartbeat_us_ = 0;
+};
+
+}  // namespace roadfix

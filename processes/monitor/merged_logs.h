@@ -1,0 +1,41 @@
+/// Several logs of one drive as one stream, in the order of recording: the drive, and what was replayed from it. A log
+/// that was recorded while an old drive was played is put back to the time of its messages.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "bus/log_reader.h"
+
+namespace roadfix {
+
+class MergedLogs {
+ public:
+  /// Throws LogError.
+  explicit MergedLogs(const std::vector<std::filesystem::path>& paths);
+
+  struct Event {
+    std::string_view channel;
+    std::span<const uint8_t> bytes;  ///< valid as long as the logs are open
+    int64_t at_us = 0;
+    std::size_t file = 0;
+    uint64_t offset = 0;  ///< in that file
+  };
+  std::optional<Event> next();
+
+  [[nodiscard]] LogEvent at(std::size_t file, uint64_t offset) const { return files_[file].reader->at(offset); }
+  [[nodiscard]] double share_done() const;  ///< of the bytes, 0 to 1
+
+ private:
+  struct File {
+    std::unique_ptr<LogReader> reader;
+    int64_t shift_us = 0;  ///< added to the stamps of recording
+    std::optional<LogEvent> head;
+  };
+  std::vector<File> files_;
+};
+
+}  // namespace roadfix

@@ -1,0 +1,29 @@
+/// Messages to what lib/health takes, and its report to HEALTH.
+#pragma once
+
+#include <roadfix/aiding_t.hpp>
+#include <roadfix/health_t.hpp>
+#include <roadfix/heartbeat_t.hpp>
+#include <roadfix/pose_t.hpp>
+#include <string>
+
+#include "health/health.h"
+
+namespace roadfix {
+
+PoseFacts pose_facts(const pose_t& message);
+HeartbeatFacts heartbeat_facts(const heartbeat_t& message);
+
+/// "GNSS position in INS": the source and whose estimate it went into.
+std::string source_name(const std::string& channel, int8_t source);
+
+/// utime, run and seq are the caller's.
+health_t health_message(const HealthReport& report);
+
+/// The type that a channel of ours carries; empty for a channel that is not ours.
+std::string type_of_channel(const std::string& channel);
+
+/// gnss_ins_ekf of HEARTBEAT_GNSS_INS_EKF.
+std::string process_of_channel(const std::string& channel);
+
+}  // namespace roadfix

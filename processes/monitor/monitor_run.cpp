@@ -1,0 +1,94 @@
+#include "monitor/monitor_run.h"
+
+#include <iostream>
+#include <memory>
+
+#include "bus/log_writer.h"
+#include "bus/message.h"
+#include "bus/run_clock.h"
+#include "bus/run_process.h"
+#include "config/config.h"
+#include "monitor/handler.h"
+#include "monitor/health_publisher.h"
+#include "monitor/host_facts.h"
+#include "monitor/merged_logs.h"
+#include "monitor/terminal.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr auto kPatience = std::chrono::milliseconds(50);
+
+void run_live(const MonitorOptions& options, const MonitorConfig& config) {
+  NetworkBus bus(options.bus);
+  RunClock clock;
+  HostWatch host(config.recordings);
+  MonitorHandler handler(config, expectations_of(config, options.vehicle));
+  HealthPublisher publisher(bus, config.publish_period, true);
+  Terminal terminal(options.plain, "");
+  handler.add(publisher);
+  handler.add(terminal);
+  bus.subscribe(".*", [&](const BusMessage& message) { handler.take(message, clock.now_utime()); });
+  while (!stop_requested()) {
+    bus.handle(kPatience);
+    const int64_t now_us = clock.now_utime();
+    if (host.due(now_us)) handler.health().host(now_us, host.facts(now_us, bus.kernel_drops()));
+    handler.advance(now_us);
+  }
+}
+
+/// HEALTH of a log, stamped with the time of its messages.
+class LogSink : public Bus {
+ public:
+  explicit LogSink(const std::filesystem::path& path) : writer_(path) {}
+  void subscribe(const std::string&, Handler, const QueuePolicy&) override {}
+  void publish(const std::string& channel, std::span<const uint8_t> bytes) override {
+    writer_.write(channel, read_header(bytes)->utime, bytes);
+  }
+  bool handle(std::chrono::milliseconds) override { return false; }
+  void commit() { writer_.commit(); }
+
+ private:
+  LogWriter writer_;
+};
+
+void run_logs(const MonitorOptions& options, const MonitorConfig& config) {
+  MergedLogs logs(options.logs);
+  // A log tells what its car had; which processes should have run, its HEARTBEAT channels tell.
+  Expectations expectations = expectations_of(config, options.vehicle);
+  expectations.processes.clear();
+  MonitorHandler handler(config, expectations);
+  std::unique_ptr<LogSink> sink;
+  std::unique_ptr<HealthPublisher> publisher;
+  if (!options.log_out.empty()) {
+    sink = std::make_unique<LogSink>(options.log_out);
+    publisher = std::make_unique<HealthPublisher>(*sink, config.publish_period, false);
+    handler.add(*publisher);
+  }
+  Terminal terminal(true, "");
+  handler.add(terminal);
+  while (const std::optional<MergedLogs::Event> event = logs.next()) {
+    if (stop_requested()) return;
+    handler.take({event->channel, event->bytes, event->at_us}, event->at_us);
+  }
+  if (sink) sink->commit();
+}
+
+}  // namespace
+
+void run_monitor(const MonitorOptions& options) {
+  MonitorConfig config;
+  if (!options.vehicle.empty()) {
+    config = load_config_or_defaults<MonitorConfig>(options.vehicle / "monitor.yaml", config);
+  }
+  if (options.print_config) {
+    std::cout << config_text(config);
+  } else if (options.logs.empty()) {
+    run_live(options, config);
+  } else {
+    run_logs(options, config);
+  }
+}
+
+}  // namespace roadfix

@@ -1,0 +1,26 @@
+/// The two ways to run the monitor: on the bus, and over logs.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bus/network_bus.h"
+#include "monitor/monitor_config.h"
+
+namespace roadfix {
+
+struct MonitorOptions {
+  std::filesystem::path vehicle;
+  std::string bus = kDefaultBusUrl;
+  std::vector<std::filesystem::path> logs;  ///< empty: live
+  std::filesystem::path log_out;
+  bool plain = false;
+  bool print_config = false;
+};
+
+/// Until stop_requested() (bus/run_process.h) or, with a log to write, the end of the log. Throws what the user can
+/// mend.
+void run_monitor(const MonitorOptions& options);
+
+}  // namespace roadfix

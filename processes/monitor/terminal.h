@@ -1,0 +1,29 @@
+/// Where the screen goes: a terminal, updated in place, or plain lines where there is none.
+#pragma once
+
+#include <string>
+
+#include "monitor/handler.h"
+
+namespace roadfix {
+
+class Terminal : public MonitorListener {
+ public:
+  /// `plain`: lines even on a terminal. `footer`: one line under the page, for example where the dashboard is.
+  Terminal(bool plain, const std::string& footer);
+  ~Terminal() override;
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  void message(const std::string&, const std::string&, const BusMessage&, int64_t) override {}
+  void decided(const HealthReport& report, bool changed) override;
+
+ private:
+  void draw(const HealthReport& report);
+
+  bool in_place_;
+  std::string footer_;
+  int64_t drawn_us_ = 0;
+};
+
+}  // namespace roadfix

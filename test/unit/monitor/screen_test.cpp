@@ -1,0 +1,78 @@
+#include "monitor/screen.h"
+
+#include <catch2/catch.hpp>
+
+using namespace roadfix;
+
+namespace {
+
+HealthReport some_report(Verdict verdict) {
+  HealthReport report;
+  report.now_us = 1'700'000'000'000'000;
+  report.since_us = report.now_us - 65'000'000;
+  report.verdict = verdict;
+  report.judged_pose = "POSE_FUSED";
+  PoseReport pose;
+  pose.name = "POSE_FUSED";
+  pose.validity = Validity::kValid;
+  pose.position_std = 0.123;
+  report.poses = {pose};
+  for (int i = 0; i < 9; ++i) {
+    report.reasons.push_back({"k" + std::to_string(i), verdict, 0, "reason number " + std::to_string(i)});
+  }
+  ChannelReport channel;
+  channel.name = "GNSS";
+  channel.rate_hz = 4.0;
+  channel.expected_hz = 4.0;
+  report.channels = {channel};
+  return report;
+}
+
+std::vector<std::string> lines_of(const std::string& page) {
+  std::vector<std::string> lines{""};
+  for (const char c : page) {
+    if (c == '\n')
+      lines.emplace_back();
+    else
+      lines.back() += c;
+  }
+  return lines;
+}
+
+std::size_t columns(const std::string& line) {
+  return static_cast<std::size_t>(
+      std::count_if(line.begin(), line.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+}  // namespace
+
+TEST_CASE("the page fits every terminal") {
+  for (const ScreenSize size : {ScreenSize{80, 24}, {200, 60}, {40, 12}, {10, 3}, {1, 1}}) {
+    for (const Verdict verdict : {Verdict::kOk, Verdict::kDegraded, Verdict::kDoNotUse}) {
+      const std::vector<std::string> lines = lines_of(render_screen(some_report(verdict), size, false));
+      CAPTURE(size.columns, size.rows);
+      CHECK(static_cast<int>(lines.size()) == size.rows);
+      for (const std::string& line : lines) CHECK(static_cast<int>(columns(line)) <= size.columns);
+    }
+  }
+}
+
+TEST_CASE("verdict in big letters where there is room, in words where there is none; reasons; figures") {
+  const std::string wide = render_screen(some_report(Verdict::kDoNotUse), {80, 40}, false);
+  CHECK_THAT(wide, Catch::Contains("█▄▄▄▀"));
+  CHECK_THAT(wide, Catch::Contains("reason number 5"));
+  CHECK_THAT(wide, Catch::Contains("and 3 more"));
+  CHECK_THAT(wide, Catch::Contains("POSE_FUSED valid, sure to 0.12 m"));
+  CHECK_THAT(wide, Catch::Contains("GNSS"));
+  const std::string narrow = render_screen(some_report(Verdict::kDoNotUse), {40, 24}, false);
+  CHECK_THAT(narrow, Catch::Contains("DO NOT USE"));
+  CHECK_THAT(narrow, !Catch::Contains("█"));
+}
+
+TEST_CASE("what comes from the bus cannot command the terminal") {
+  HealthReport report = some_report(Verdict::kDegraded);
+  report.reasons = {{"k", Verdict::kDegraded, 0, "evil \x1b[2J\x07 text\nsecond line"}};
+  CHECK(render_screen(report, {80, 24}, false).find('\x1b') == std::string::npos);
+  CHECK(lines_of(render_screen(report, {80, 24}, false)).size() == 24);
+  CHECK(plain_line(report) == "22:13:20 DEGRADED: evil ?[2J? text?second line");
+}
