@@ -1,43 +1,57 @@
 #include "gnss_ins/covariance_step.h"
 
 #include <cmath>
+#include <utility>
 
 #include "geometry/so3.h"
 
 namespace roadfix {
 
-void TransitionSums::add(const Eigen::Matrix3d& R, const InertialStep& step, double gyro_density,
-                         double accel_density) {
+void TransitionSums::add(const Eigen::Matrix3d& R, const Eigen::Vector3d& dv, const InertialStep& step,
+                         double gyro_density, double accel_density) {
   const double dt = step.dt;
-  const Eigen::Vector3d dv = R * step.specific_force * dt;
-  const Eigen::Matrix3d R_force = R * step.specific_force.asDiagonal();
+  RotationBlocks now;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector4d axis(R(0, i), R(1, i), R(2, i), 0.0);
+    now.col(i) = axis;
+    now.col(3 + i) = step.specific_force(i) * axis;
+    now.col(6 + i) = step.rate(i) * axis;
+  }
   position_change += dt * (velocity_change + 0.5 * dv);
   velocity_change += dv;
-  rotation2 += dt * (rotation + (0.5 * dt) * R);
-  rotation += dt * R;
-  rotation_force2 += dt * (rotation_force + (0.5 * dt) * R_force);
-  rotation_force += dt * R_force;
-  rotation_rate += R * (dt * step.rate).asDiagonal();
+  integral += dt * (sum + (0.5 * dt) * now);
+  sum += dt * now;
   gyro_variance += gyro_density * gyro_density * dt;
   accel_variance += accel_density * accel_density * dt;
   duration += dt;
 }
 
-Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rate, const GnssInsConfig& config)
-    : duration(s.duration) {
+Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rate, const GnssInsConfig& config) {
+  const Eigen::Matrix3d rotation = s.sum.block<3, 3>(0, 0), rotation2 = s.integral.block<3, 3>(0, 0);
+  const Eigen::Matrix3d force = s.sum.block<3, 3>(0, 3), force2 = s.integral.block<3, 3>(0, 3);
+  const Eigen::Matrix3d rate = s.sum.block<3, 3>(0, 6);
   const Eigen::Matrix3d turn = skew(earth_rate * s.duration);
   const Eigen::Matrix3d dv_cross = skew(s.velocity_change);
   const Eigen::Matrix3d dp_cross = skew(s.position_change);
-  vel_vel = Eigen::Matrix3d::Identity() - 2.0 * turn;
-  pos_vel = s.duration * (Eigen::Matrix3d::Identity() - turn);
-  att_att = Eigen::Matrix3d::Identity() - turn;
-  vel_att = -dv_cross;
-  pos_att = -dp_cross;
+  moved.setZero();
+  moved.block<3, 3>(kPos, kPos).setIdentity();
+  moved.block<3, 3>(kPos, kVel) = s.duration * (Eigen::Matrix3d::Identity() - turn);
+  moved.block<3, 3>(kVel, kVel) = Eigen::Matrix3d::Identity() - 2.0 * turn;
+  moved.block<3, 3>(kAtt, kAtt) = Eigen::Matrix3d::Identity() - turn;
+  moved.block<3, 3>(kPos, kAtt) = -dp_cross;
+  moved.block<3, 3>(kVel, kAtt) = -dv_cross;
   // A gyro error turns the attitude in proportion to time, and that turns the specific force: half of the product for
   // the velocity, a third for the position, exact for constant motion within the step.
-  att_imu << -s.rotation, Eigen::Matrix3d::Zero(), -s.rotation_rate, Eigen::Matrix3d::Zero();
-  vel_imu << 0.5 * dv_cross * s.rotation, -s.rotation, 0.5 * dv_cross * s.rotation_rate, -s.rotation_force;
-  pos_imu << dp_cross * s.rotation / 3.0, -s.rotation2, dp_cross * s.rotation_rate / 3.0, -s.rotation_force2;
+  moved.block<3, 3>(kAtt, kGyroBias) = -rotation;
+  moved.block<3, 3>(kAtt, kGyroScale) = -rate;
+  moved.block<3, 3>(kVel, kGyroBias) = 0.5 * dv_cross * rotation;
+  moved.block<3, 3>(kVel, kGyroScale) = 0.5 * dv_cross * rate;
+  moved.block<3, 3>(kVel, kAccelBias) = -rotation;
+  moved.block<3, 3>(kVel, kAccelScale) = -force;
+  moved.block<3, 3>(kPos, kGyroBias) = dp_cross * rotation / 3.0;
+  moved.block<3, 3>(kPos, kGyroScale) = dp_cross * rate / 3.0;
+  moved.block<3, 3>(kPos, kAccelBias) = -rotation2;
+  moved.block<3, 3>(kPos, kAccelScale) = -force2;
 
   decay.setOnes();
   noise.setZero();
@@ -60,59 +74,87 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
 
 ErrorMatrix Transition::dense() const {
   ErrorMatrix phi = decay.asDiagonal();
-  phi.block<3, 3>(kPos, kVel) = pos_vel;
-  phi.block<3, 3>(kVel, kVel) = vel_vel;
-  phi.block<3, 3>(kAtt, kAtt) = att_att;
-  phi.block<3, 3>(kPos, kAtt) = pos_att;
-  phi.block<3, 3>(kVel, kAtt) = vel_att;
-  phi.block<3, 12>(kPos, kGyroBias) = pos_imu;
-  phi.block<3, 12>(kVel, kGyroBias) = vel_imu;
-  phi.block<3, 12>(kAtt, kGyroBias) = att_imu;
+  phi.topLeftCorner<9, kInertialStates>() = moved;
   return phi;
 }
 
 namespace {
 
-// The nine moved rows of Phi P, for the columns of P.
-using NineRows = Eigen::Matrix<double, 9, kStates>;
+using Packet = Eigen::internal::packet_traits<double>::type;  // one vector register
+constexpr int kLanes = Eigen::internal::packet_traits<double>::size;
 
-NineRows moved_rows(const ErrorMatrix& P, const Transition& phi) {
-  NineRows rows;
-  rows.middleRows<3>(kPos) = P.middleRows<3>(kPos);
-  rows.middleRows<3>(kPos).noalias() += phi.pos_vel.lazyProduct(P.middleRows<3>(kVel));
-  rows.middleRows<3>(kPos).noalias() += phi.pos_att.lazyProduct(P.middleRows<3>(kAtt));
-  rows.middleRows<3>(kPos).noalias() += phi.pos_imu.lazyProduct(P.middleRows<12>(kGyroBias));
-  rows.middleRows<3>(kVel).noalias() = phi.vel_vel.lazyProduct(P.middleRows<3>(kVel));
-  rows.middleRows<3>(kVel).noalias() += phi.vel_att.lazyProduct(P.middleRows<3>(kAtt));
-  rows.middleRows<3>(kVel).noalias() += phi.vel_imu.lazyProduct(P.middleRows<12>(kGyroBias));
-  rows.middleRows<3>(kAtt).noalias() = phi.att_att.lazyProduct(P.middleRows<3>(kAtt));
-  rows.middleRows<3>(kAtt).noalias() += phi.att_imu.lazyProduct(P.middleRows<12>(kGyroBias));
-  return rows;
+/// Columns, of `Rows` numbers each, of the product of a matrix with the rows of `moved`: one column of the result at a
+/// time, held in registers.
+template <int Rows, int... Lane>
+class MovedColumns {
+ public:
+  MovedColumns(const double* columns, const Transition& phi) : columns_(columns), phi_(phi) {}
+
+  void write(double* to) const {
+    for (int row = 0; row < 9; ++row) {
+      Packet sum[] = {(static_cast<void>(Lane), Eigen::internal::pset1<Packet>(0.0))...};
+      if (row < kVel) {
+        add(sum, row, row, row + 1);
+        add(sum, row, kVel, kInertialStates);
+      } else if (row < kAtt) {
+        add(sum, row, kVel, kInertialStates);
+      } else {  // no force turns the car
+        add(sum, row, kAtt, kAccelBias);
+        add(sum, row, kGyroScale, kAccelScale);
+      }
+      (Eigen::internal::pstore(to + Rows * row + kLanes * Lane, sum[Lane]), ...);
+    }
+  }
+
+ private:
+  void add(Packet (&sum)[sizeof...(Lane)], int row, int first, int last) const {
+    for (int k = first; k < last; ++k) {
+      const Packet factor = Eigen::internal::pset1<Packet>(phi_.moved(row, k));
+      const double* column = columns_ + Rows * k;
+      ((sum[Lane] = Eigen::internal::pmadd(factor, Eigen::internal::pload<Packet>(column + kLanes * Lane), sum[Lane])),
+       ...);
+    }
+  }
+
+  const double* columns_;
+  const Transition& phi_;
+};
+
+template <int Rows, int... Lane>
+void write_moved(const double* columns, const Transition& phi, double* to, std::integer_sequence<int, Lane...>) {
+  MovedColumns<Rows, Lane...>(columns, phi).write(to);
+}
+
+/// columns * moved', written to `to`; both aligned, with columns of `Rows` numbers.
+template <int Rows>
+void times_moved(const double* columns, const Transition& phi, double* to) {
+  static_assert(Rows % kLanes == 0);
+  write_moved<Rows>(columns, phi, to, std::make_integer_sequence<int, Rows / kLanes>());
 }
 
 }  // namespace
 
 void propagate_covariance(ErrorMatrix& P, const Transition& phi, const TransitionSums& sums) {
-  const NineRows rows = moved_rows(P, phi);
-  // Columns of the moved block: (Phi P) Phi', from the same products on the transpose.
-  Eigen::Matrix<double, 9, 9> A;
-  A.middleCols<3>(kPos).noalias() = rows.middleCols<3>(kPos);
-  A.middleCols<3>(kPos).noalias() += rows.middleCols<3>(kVel).lazyProduct(phi.pos_vel.transpose());
-  A.middleCols<3>(kPos).noalias() += rows.middleCols<3>(kAtt).lazyProduct(phi.pos_att.transpose());
-  A.middleCols<3>(kPos).noalias() += rows.middleCols<12>(kGyroBias).lazyProduct(phi.pos_imu.transpose());
-  A.middleCols<3>(kVel).noalias() = rows.middleCols<3>(kVel).lazyProduct(phi.vel_vel.transpose());
-  A.middleCols<3>(kVel).noalias() += rows.middleCols<3>(kAtt).lazyProduct(phi.vel_att.transpose());
-  A.middleCols<3>(kVel).noalias() += rows.middleCols<12>(kGyroBias).lazyProduct(phi.vel_imu.transpose());
-  A.middleCols<3>(kAtt).noalias() = rows.middleCols<3>(kAtt).lazyProduct(phi.att_att.transpose());
-  A.middleCols<3>(kAtt).noalias() += rows.middleCols<12>(kGyroBias).lazyProduct(phi.att_imu.transpose());
+  // P is symmetric, so its columns are its rows: P Phi' first, nine columns of it.
+  Eigen::Matrix<double, kStates, 9> moved;
+  times_moved<kStates>(P.data(), phi, moved.data());
+  // Then Phi (P Phi'), by the same sums on the transpose.
+  Eigen::Matrix<double, 12, kInertialStates> rows = Eigen::Matrix<double, 12, kInertialStates>::Zero();
+  rows.topRows<9>() = moved.topRows<kInertialStates>().transpose();
+  Eigen::Matrix<double, 12, 9> both;
+  times_moved<12>(rows.data(), phi, both.data());
+  const auto A = both.topRows<9>();
 
   constexpr int kRest = kStates - 9;
+  constexpr int kFading = kInertialStates - 9;  // the others keep their value
   P.topLeftCorner<9, 9>() = 0.5 * (A + A.transpose());
-  P.topRightCorner<9, kRest>() = rows.rightCols<kRest>() * phi.decay.tail<kRest>().asDiagonal();
-  P.bottomLeftCorner<kRest, 9>() = P.topRightCorner<9, kRest>().transpose();
+  const Eigen::Matrix<double, kRest, 1> decay = phi.decay.tail<kRest>();
+  P.bottomLeftCorner<kRest, 9>() = moved.bottomRows<kRest>().array().colwise() * decay.array();
+  P.topRightCorner<9, kRest>() = P.bottomLeftCorner<kRest, 9>().transpose();
   // Products of the two factors commute, so the block stays symmetric to the last bit.
-  const Eigen::Matrix<double, kRest, kRest> factors = phi.decay.tail<kRest>() * phi.decay.tail<kRest>().transpose();
-  P.bottomRightCorner<kRest, kRest>().array() *= factors.array();
+  for (int j = 0; j < kFading; ++j) P.block<kRest, 1>(9, 9 + j).array() *= decay(j) * decay.array();
+  for (int j = kFading; j < kRest; ++j)
+    P.block<kFading, 1>(9, 9 + j).array() *= decay(j) * decay.head<kFading>().array();
   P.diagonal() += phi.noise;
 
   // White noise of the sensors over the step, (M.15); its share in the position is below a micrometre at 20 Hz but

@@ -8,36 +8,35 @@
 
 namespace roadfix {
 
+/// R, R diag(f), R diag(rate) below each other's columns, with a row of zeros: as one aligned array, because they are
+/// summed at every sample.
+using RotationBlocks = Eigen::Matrix<double, 4, 9>;
+
 /// What the transition matrix needs of the samples since the last covariance step.
 struct TransitionSums {
   double duration = 0.0;                                      ///< s
   Eigen::Vector3d velocity_change = Eigen::Vector3d::Zero();  ///< sum of R f dt
   Eigen::Vector3d position_change = Eigen::Vector3d::Zero();  ///< its integral
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();         ///< sum of R dt
-  Eigen::Matrix3d rotation2 = Eigen::Matrix3d::Zero();        ///< its integral
-  Eigen::Matrix3d rotation_rate = Eigen::Matrix3d::Zero();    ///< sum of R diag(rate) dt
-  Eigen::Matrix3d rotation_force = Eigen::Matrix3d::Zero();   ///< sum of R diag(f) dt
-  Eigen::Matrix3d rotation_force2 = Eigen::Matrix3d::Zero();  ///< its integral
+  RotationBlocks sum = RotationBlocks::Zero();                ///< of the blocks times dt
+  RotationBlocks integral = RotationBlocks::Zero();           ///< of that
   double gyro_variance = 0.0;                                 ///< sum of noise density squared times dt
   double accel_variance = 0.0;
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(duration, velocity_change, position_change, rotation, rotation2, rotation_rate, rotation_force, rotation_force2,
-      gyro_variance, accel_variance);
+    a(duration, velocity_change, position_change, sum, integral, gyro_variance, accel_variance);
   }
 
-  void add(const Eigen::Matrix3d& R, const InertialStep& step, double gyro_density, double accel_density);
+  /// R: imu to enu in the middle of the step; `dv` what its specific force gave, m/s, enu axes.
+  void add(const Eigen::Matrix3d& R, const Eigen::Vector3d& dv, const InertialStep& step, double gyro_density,
+           double accel_density);
 };
 
-/// The blocks of the transition matrix that are neither zero nor identity, (M.12).
+/// The transition matrix, (M.12): nine rows that other states move, and the diagonal of the rest.
 struct Transition {
-  double duration = 0.0;
-  Eigen::Matrix3d pos_vel, vel_vel, att_att;
-  Eigen::Matrix3d pos_att, vel_att;
-  Eigen::Matrix<double, 3, 12> pos_imu, vel_imu, att_imu;  ///< gyro bias, accel bias, gyro scale, accel scale
-  ErrorVector decay;                                       ///< diagonal of the states that are not moved by others
-  ErrorVector noise;                                       ///< their variance added
+  Eigen::Matrix<double, 9, kInertialStates> moved;  ///< position, velocity, attitude
+  ErrorVector decay;                                ///< diagonal of the states that are not moved by others
+  ErrorVector noise;                                ///< their variance added
 
   Transition(const TransitionSums& sums, const Eigen::Vector3d& earth_rate, const GnssInsConfig& config);
   [[nodiscard]] ErrorMatrix dense() const;  ///< the whole matrix, for tests

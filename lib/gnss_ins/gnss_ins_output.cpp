@@ -17,22 +17,29 @@ struct OutputCovariance {
   Eigen::Matrix3d velocity;
 
   OutputCovariance(const NavState& x, const BodyMotion& m, const ErrorMatrix& P) {
+    // Position and velocity at the true time, rotation in imu axes, velocity in imu axes: each is three of the rows of
+    // J, of which only these blocks are not zero.
     const Eigen::Matrix3d Rt = x.q_enu_imu.toRotationMatrix().transpose();
-    Eigen::Matrix<double, 9, 10> J = Eigen::Matrix<double, 9, 10>::Zero();
-    J.block<3, 3>(0, 0).setIdentity();
-    J.block<3, 3>(0, 3) = x.imu_offset * Eigen::Matrix3d::Identity();
-    J.block<3, 1>(0, 9) = x.velocity + x.imu_offset * m.acceleration;
-    J.block<3, 3>(3, 6) = Rt;
-    J.block<3, 1>(3, 9) = m.rate;
-    J.block<3, 3>(6, 3) = Rt;
-    J.block<3, 3>(6, 6) = Rt * skew(x.velocity);
-    J.block<3, 1>(6, 9) = Rt * m.acceleration;
+    const Eigen::Matrix3d turned = Rt * skew(x.velocity);
     Eigen::Matrix<double, 10, 10> used;
     used.topLeftCorner<9, 9>() = P.topLeftCorner<9, 9>();
     used.topRightCorner<9, 1>() = P.block<9, 1>(0, kImuOffset);
     used.bottomLeftCorner<1, 9>() = P.block<1, 9>(kImuOffset, 0);
     used(9, 9) = P(kImuOffset, kImuOffset);
-    const Eigen::Matrix<double, 9, 9> all = J * used * J.transpose();
+    const auto rows = [&](const auto& of) {
+      Eigen::Matrix<double, 9, 10> out;
+      out.middleRows<3>(0) = of.template middleRows<3>(kPos) + x.imu_offset * of.template middleRows<3>(kVel);
+      out.middleRows<3>(0) += (x.velocity + x.imu_offset * m.acceleration).lazyProduct(of.row(9));
+      out.middleRows<3>(3) = Rt.lazyProduct(of.template middleRows<3>(kAtt));
+      out.middleRows<3>(3) += m.rate.lazyProduct(of.row(9));
+      out.middleRows<3>(6) = Rt.lazyProduct(of.template middleRows<3>(kVel));
+      out.middleRows<3>(6) += turned.lazyProduct(of.template middleRows<3>(kAtt));
+      out.middleRows<3>(6) += (Rt * m.acceleration).lazyProduct(of.row(9));
+      return out;
+    };
+    Eigen::Matrix<double, 10, 10> half = Eigen::Matrix<double, 10, 10>::Zero();
+    half.leftCols<9>() = rows(used).transpose();
+    const Eigen::Matrix<double, 9, 9> all = rows(half).leftCols<9>();
     pose = 0.5 * (all.topLeftCorner<6, 6>() + all.topLeftCorner<6, 6>().transpose());
     velocity = 0.5 * (all.bottomRightCorner<3, 3>() + all.bottomRightCorner<3, 3>().transpose());
   }

@@ -16,7 +16,8 @@ ImuMonitor::ImuMonitor(const GnssInsConfig& config)
     : spec_gyro_(config.vehicle.gyro_noise),
       spec_accel_(config.vehicle.accel_noise),
       factor_(config.propagation.vibration_factor),
-      block_s_(config.aiding.zero_interval) {}
+      block_s_(config.aiding.zero_interval),
+      noise_{spec_gyro_, spec_accel_} {}
 
 void NoiseBand::add(const ImuSample& imu, double dt) {
   gyro_sum_ += imu.gyro;
@@ -49,6 +50,7 @@ bool ImuMonitor::add(const ImuSample& imu, double dt) {
     clipped_(i) = imu.gyro(i) == last_.gyro(i) && std::abs(imu.gyro(i)) > kClippedRate ? clipped_(i) + 1 : 0;
   last_ = imu;
   for (NoiseBand& band : bands_) band.add(imu, dt);
+  find_noise();
 
   const double elapsed = times_.sum();
   const int quarter = std::min(kQuarters - 1, static_cast<int>(elapsed / block_s_ * kQuarters));
@@ -77,14 +79,14 @@ void ImuMonitor::finish_block(int64_t t_us) {
   times_.setZero();
 }
 
-ImuNoise ImuMonitor::noise() const {
+void ImuMonitor::find_noise() {
   ImuNoise quietest = bands_.front().density();
   for (const NoiseBand& band : bands_) {
     if (!band.known()) continue;
     quietest.gyro = std::min(quietest.gyro, band.density().gyro);
     quietest.accel = std::min(quietest.accel, band.density().accel);
   }
-  return {std::max(spec_gyro_, factor_ * quietest.gyro), std::max(spec_accel_, factor_ * quietest.accel)};
+  noise_ = {std::max(spec_gyro_, factor_ * quietest.gyro), std::max(spec_accel_, factor_ * quietest.accel)};
 }
 
 }  // namespace roadfix

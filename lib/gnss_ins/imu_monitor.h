@@ -52,7 +52,7 @@ class ImuMonitor {
 
   /// (M.17): white noise shows alike in every band, a vibration in some and motion in the slow one; the quietest band
   /// therefore tells the white noise.
-  [[nodiscard]] ImuNoise noise() const;
+  [[nodiscard]] const ImuNoise& noise() const { return noise_; }
   [[nodiscard]] const ImuBlock& block() const { return block_; }
   /// Identical readings for longer than a sensor with noise can give.
   [[nodiscard]] bool frozen() const { return repeats_ >= kFrozenSamples; }
@@ -69,8 +69,10 @@ class ImuMonitor {
   static constexpr int kClippedSamples = 8;
   static constexpr double kClippedRate = 0.05;  // rad/s, slower is no end of a range
   void finish_block(int64_t t_us);
+  void find_noise();
 
   double spec_gyro_, spec_accel_, factor_, block_s_;
+  ImuNoise noise_;
   ImuSample last_;
   int repeats_ = 0;
   Eigen::Vector3i clipped_ = Eigen::Vector3i::Zero();  // samples in a row, by axis
@@ -82,8 +84,8 @@ class ImuMonitor {
 
 template <class Archive>
 void ImuMonitor::serialise(Archive& a) {
-  a(last_.t_us, last_.gyro, last_.accel, repeats_, clipped_.x(), clipped_.y(), clipped_.z(), sums_, times_,
-    block_.end_us, block_.duration, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander);
+  a(noise_.gyro, noise_.accel, last_.t_us, last_.gyro, last_.accel, repeats_, clipped_.x(), clipped_.y(), clipped_.z(),
+    sums_, times_, block_.end_us, block_.duration, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander);
   for (NoiseBand& band : bands_) band.serialise(a);
 }
 

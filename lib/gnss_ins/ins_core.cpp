@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/so3.h"
+
 namespace roadfix {
 
 namespace {
@@ -25,11 +27,13 @@ void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
 void InsCore::predict(const ImuSample& imu, double dt, const ImuNoise& noise) {
   const InertialStep step = corrected(x_, imu, dt);
   const Eigen::Matrix3d R = x_.q_enu_imu.toRotationMatrix();
-  sums_.add(R, step, noise.gyro, noise.accel);
   const Eigen::Vector3d v_before = x_.velocity;
-  mechanise(x_, last_, step, earth_);
+  const Eigen::Vector3d dv = mechanise(x_, R, last_, step, earth_);
+  sums_.add(R + R * skew(0.5 * dt * step.rate), dv, step, noise.gyro, noise.accel);
   x_.t_us = imu.t_us;
-  const double fade = std::exp(-dt / config_.vehicle.correlation_s);
+  // exp(-x) to x^3 / 6, where x, samples over an hour, is 1e-5.
+  const double share = dt / config_.vehicle.correlation_s;
+  const double fade = share < 1e-3 ? 1.0 - share + 0.5 * share * share : std::exp(-share);
   x_.gyro_bias *= fade;
   x_.accel_bias *= fade;
   x_.gyro_scale *= fade;

@@ -77,7 +77,7 @@ class InsCore {
     d.add(x_.q_enu_imu.coeffs());
     d.add(P_);
     d.add(sums_.velocity_change);
-    d.add(sums_.rotation);
+    d.add(Eigen::Matrix<double, 4, 3>(sums_.sum.leftCols<3>()));
   }
 
  private:

@@ -4,6 +4,21 @@
 
 namespace roadfix {
 
+namespace {
+
+// Below this angle the series of exp_step() are exact to rounding: the first term left out is theta^8 / 1e7.
+constexpr double kSeriesAngle = 0.1;  // rad, more than a car turns between two samples of a sound IMU
+
+Eigen::Quaterniond exp_step(const Eigen::Vector3d& theta) {
+  const double t = theta.squaredNorm();
+  if (t > kSeriesAngle * kSeriesAngle) return exp_q(theta);
+  const double k = 0.5 - t * (1.0 / 48.0 - t * (1.0 / 3840.0 - t / 645120.0));  // sin(|theta| / 2) / |theta|
+  const double w = 1.0 - t * (1.0 / 8.0 - t * (1.0 / 384.0 - t / 46080.0));     // cos(|theta| / 2)
+  return {w, k * theta.x(), k * theta.y(), k * theta.z()};
+}
+
+}  // namespace
+
 InertialStep corrected(const NavState& x, const ImuSample& imu, double dt) {
   InertialStep s;
   s.dt = dt;
@@ -12,7 +27,8 @@ InertialStep corrected(const NavState& x, const ImuSample& imu, double dt) {
   return s;
 }
 
-void mechanise(NavState& x, const InertialStep& before, const InertialStep& now, EarthModel& earth) {
+Eigen::Vector3d mechanise(NavState& x, const Eigen::Matrix3d& R, const InertialStep& before, const InertialStep& now,
+                          EarthModel& earth) {
   const double dt = now.dt;
   const Eigen::Vector3d angle = now.rate * dt;
   const Eigen::Vector3d dv = now.specific_force * dt;
@@ -27,14 +43,17 @@ void mechanise(NavState& x, const InertialStep& before, const InertialStep& now,
 
   const Eigen::Vector3d v0 = x.velocity;
   const Eigen::Vector3d earth_turn = earth.rate() * dt;
-  const Eigen::Vector3d dv_enu = x.q_enu_imu * dv_start;
+  const Eigen::Vector3d dv_enu = R * dv_start;
   const Eigen::Vector3d forces = earth.gravity(x.position) * dt;
   // (M.5): the frame turns by earth_turn during the step, half of it seen by the mean specific force.
   const Eigen::Vector3d v_mid = v0 + 0.5 * (dv_enu + forces);
   x.velocity = v0 + dv_enu - 0.5 * earth_turn.cross(dv_enu) + forces - 2.0 * earth_turn.cross(v_mid);
   // (M.6): mean of both ends, plus the third-order term of a specific force that changes within the step.
   x.position += 0.5 * dt * (v0 + x.velocity);
-  x.q_enu_imu = (exp_q(-earth_turn) * x.q_enu_imu * exp_q(rotation)).normalized();  // (M.7)
+  // (M.7); the Earth turns by less than 1e-3 rad even in a gap of ten seconds, so half of it is the sine of the half.
+  const Eigen::Quaterniond earth_q(1.0, -0.5 * earth_turn.x(), -0.5 * earth_turn.y(), -0.5 * earth_turn.z());
+  x.q_enu_imu = (earth_q * x.q_enu_imu * exp_step(rotation)).normalized();
+  return dv_enu;
 }
 
 }  // namespace roadfix

@@ -23,7 +23,9 @@ struct InertialStep {
 /// The reading without bias and scale error, (M.2).
 InertialStep corrected(const NavState& x, const ImuSample& imu, double dt);
 
-/// Moves x over `now`; `before` is the step ahead of it (for coning and sculling; dt 0 where there is none).
-void mechanise(NavState& x, const InertialStep& before, const InertialStep& now, EarthModel& earth);
+/// Moves x, whose attitude as a matrix is R, over `now`; `before` is the step ahead of it (for coning and sculling; dt
+/// 0 where there is none). Returns what the specific force gave, m/s, enu axes.
+Eigen::Vector3d mechanise(NavState& x, const Eigen::Matrix3d& R, const InertialStep& before, const InertialStep& now,
+                          EarthModel& earth);
 
 }  // namespace roadfix
