@@ -18,12 +18,13 @@ std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {
   return out;
 }
 
-std::vector<uint8_t> lucas_kanade(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second,
+std::vector<uint8_t> lucas_kanade(const FlowPyramid& first, const FlowPyramid& second,
                                   const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to,
                                   const FlowConfig& config, int levels) {
   std::vector<uint8_t> found;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(first, second, from, to, found, error, cv::Size(config.window_px, config.window_px), levels,
+  cv::calcOpticalFlowPyrLK(first.mats, second.mats, from, to, found, error,
+                           cv::Size(config.window_px, config.window_px), levels,
                            cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kIterations, kEnoughPx),
                            cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   return found;
@@ -31,16 +32,15 @@ std::vector<uint8_t> lucas_kanade(const std::vector<cv::Mat>& first, const std::
 
 }  // namespace
 
-std::vector<cv::Mat> flow_pyramid(const cv::Mat& gray, const FlowConfig& config) {
-  std::vector<cv::Mat> pyramid;
-  cv::buildOpticalFlowPyramid(gray, pyramid, cv::Size(config.window_px, config.window_px), config.levels, false,
+FlowPyramid flow_pyramid(const cv::Mat& gray, const FlowConfig& config) {
+  FlowPyramid pyramid;
+  cv::buildOpticalFlowPyramid(gray, pyramid.mats, cv::Size(config.window_px, config.window_px), config.levels, true,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);  // a copy: the caller may reuse gray
   return pyramid;
 }
 
-std::vector<bool> follow(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second,
-                         std::span<const Eigen::Vector2f> from, std::span<Eigen::Vector2f> to,
-                         const FlowConfig& config) {
+std::vector<bool> follow(const FlowPyramid& first, const FlowPyramid& second, std::span<const Eigen::Vector2f> from,
+                         std::span<Eigen::Vector2f> to, const FlowConfig& config) {
   std::vector<bool> good(from.size(), false);
   if (from.empty()) return good;
   const std::vector<cv::Point2f> start = to_cv(from);
@@ -49,7 +49,7 @@ std::vector<bool> follow(const std::vector<cv::Mat>& first, const std::vector<cv
   std::vector<cv::Point2f> back = start;
   const std::vector<uint8_t> returned =
       lucas_kanade(second, first, end, back, config, std::min(kLevelsBack, config.levels));
-  const cv::Size size = first.front().size();
+  const cv::Size size = first.picture().size();
   for (size_t i = 0; i < from.size(); ++i) {
     const bool inside = end[i].x >= 0.0F && end[i].y >= 0.0F && end[i].x <= static_cast<float>(size.width - 1) &&
                         end[i].y <= static_cast<float>(size.height - 1);

@@ -29,7 +29,7 @@ struct FrontEndConfig {
   double min_distance_px = 16.0;  ///< between two tracks when the second begins
   int fast_threshold = 8;         ///< grey levels by which a corner's ring differs from its centre
   // Optical flow.
-  int klt_window_px = 21;
+  int klt_window_px = 11;              ///< larger ones see more of a slanted wall move, and a drive comes out too short
   int klt_levels = 3;                  ///< pyramid levels above the picture itself
   double klt_max_round_trip_px = 0.7;  ///< there and back again
   // Descriptors.

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "features/corners.h"
-#include "features/flow.h"
 #include "features/saved_features.h"
 
 namespace roadfix {
@@ -17,9 +16,9 @@ FlowConfig flow_config(const FrontEndConfig& config) {
 
 std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Feature> hints) {
   const FlowConfig flow = flow_config(config_);
-  std::vector<cv::Mat> pyramid = flow_pyramid(gray, flow);
+  FlowPyramid pyramid = flow_pyramid(gray, flow);
   num_expected_ = static_cast<int>(live_.size());
-  const bool same_size = !pyramid_.empty() && pyramid_.front().size() == gray.size();
+  const bool same_size = !pyramid_.empty() && pyramid_.picture().size() == gray.size();
   if (same_size && !live_.empty()) {
     std::vector<Eigen::Vector2f> from, to;
     auto hint = hints.begin();
@@ -52,7 +51,7 @@ std::vector<Feature> KltTracks::replenish() {
   corners.min_distance_px = config_.min_distance_px;
   corners.fast_threshold = config_.fast_threshold;
   corners.border_px = config_.klt_window_px / 2 + 1;
-  for (const Corner& corner : spread_corners(pyramid_.front(), taken, corners))
+  for (const Corner& corner : spread_corners(pyramid_.picture(), taken, corners))
     fresh.push_back({next_track_++, corner.pixel});
   live_.insert(live_.end(), fresh.begin(), fresh.end());
   return fresh;
@@ -66,7 +65,7 @@ void KltTracks::save(StateWriter& writer) const {
   writer.put(next_track_);
   writer.put(num_expected_);
   save_features(live_, writer);
-  save_picture(pyramid_.empty() ? cv::Mat() : pyramid_.front(), writer);
+  save_picture(pyramid_.empty() ? cv::Mat() : pyramid_.picture(), writer);
 }
 
 void KltTracks::load(StateReader& reader) {
@@ -74,13 +73,13 @@ void KltTracks::load(StateReader& reader) {
   reader.get(num_expected_);
   live_ = load_features(reader);
   const cv::Mat picture = load_picture(reader);
-  pyramid_.clear();
+  pyramid_ = {};
   if (!picture.empty()) pyramid_ = flow_pyramid(picture, flow_config(config_));
 }
 
 void KltTracks::reset() {
   live_.clear();
-  pyramid_.clear();
+  pyramid_ = {};
 }
 
 }  // namespace roadfix

@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "features/flow.h"
 #include "features/front_end.h"
 
 namespace roadfix {
@@ -24,8 +25,8 @@ class KltTracks final : public FrontEnd {
   FrontEndConfig config_;
   int64_t next_track_ = 1;
   int num_expected_ = 0;
-  std::vector<Feature> live_;     ///< ascending by track, where they are in the last picture
-  std::vector<cv::Mat> pyramid_;  ///< of the last picture, whose pixels are its first level
+  std::vector<Feature> live_;  ///< ascending by track, where they are in the last picture
+  FlowPyramid pyramid_;        ///< of the last picture, whose pixels are its first level
 };
 
 }  // namespace roadfix

@@ -12,7 +12,7 @@ constexpr int kSearchLevel = 1;  ///< of the pyramid: half the size
 constexpr int kSearchHalf = 4;   ///< patches of 9 x 9 pixels at that level
 constexpr int kPatch = (2 * kSearchHalf + 1) * (2 * kSearchHalf + 1);
 constexpr int kRefineLevels = 1;
-constexpr int kRefineWindow = 15;
+constexpr int kRefineWindow = 16;  ///< a multiple of 8: OpenCV takes eight pixels of a row at a time
 
 struct Patch {
   std::array<int, kPatch> value{};
@@ -114,8 +114,8 @@ std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& 
                                                                  std::span<const StereoQuery> queries) const {
   std::vector<std::optional<Eigen::Vector2f>> result(queries.size());
   const FlowConfig flow{kRefineWindow, kRefineLevels, config_.max_round_trip_px};
-  const std::vector<cv::Mat> left_pyramid = flow_pyramid(left, flow), right_pyramid = flow_pyramid(right, flow);
-  if (left_pyramid.size() <= kSearchLevel || right_pyramid.size() <= kSearchLevel) return result;
+  const FlowPyramid left_pyramid = flow_pyramid(left, flow), right_pyramid = flow_pyramid(right, flow);
+  if (left_pyramid.levels() <= kSearchLevel || right_pyramid.levels() <= kSearchLevel) return result;
 
   std::vector<size_t> index;
   std::vector<Eigen::Vector2f> from, to;
@@ -123,8 +123,8 @@ std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& 
     const auto normalised = left_.unproject(queries[i].pixel.cast<double>());
     if (!normalised) continue;
     const auto start = queries[i].depth ? right_pixel(*normalised, 1.0 / *queries[i].depth)
-                                        : search(left_pyramid[kSearchLevel], right_pyramid[kSearchLevel],
-                                                 queries[i].pixel, *normalised);
+                                        : search(left_pyramid.picture(kSearchLevel),
+                                                 right_pyramid.picture(kSearchLevel), queries[i].pixel, *normalised);
     if (!start) continue;
     index.push_back(i);
     from.push_back(queries[i].pixel);
