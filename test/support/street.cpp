@@ -61,7 +61,9 @@ cv::Mat Street::picture(const SE3& T_world_camera, const CameraIntrinsics& lens,
       const auto level = static_cast<size_t>(std::clamp(std::lround(std::log2(std::max(1.0, texels_per_pixel))), 0L,
                                                         static_cast<long>(levels_.size()) - 1));
       const double shrink = 1.0 / static_cast<double>(1U << level);
-      const double value = sample(levels_[level], u * shrink, v * shrink) + grain(random);
+      // A coarse texel's centre is the mean of those it was made of: without the halves every change of level would
+      // shift the texture by up to half a pixel.
+      const double value = sample(levels_[level], (u + 0.5) * shrink - 0.5, (v + 0.5) * shrink - 0.5) + grain(random);
       out.at<uint8_t>(row, column) = static_cast<uint8_t>(std::clamp(value, 0.0, 255.0));
     }
   }

@@ -72,9 +72,7 @@ TEST_CASE("stereo follows the drive to a percent") {
   CHECK(run.tracker.last().reset_counter == 0);
 }
 
-// A known defect, so that it is seen when it is mended: on pictures the covariance takes the tracks' noise for white
-// and is too small (Mahalanobis 75 of 6 here, sigma 0.05 m beside 0.17 m on KITTI 00), MODEL.md.
-TEST_CASE("stereo's covariance on pictures holds the error", "[!shouldfail]") {
+TEST_CASE("stereo's covariance on pictures holds the error") {
   Run run(true);
   for (const CameraFrame& frame : drive()) run.tracker.process(frame);
   const Odometry& last = run.tracker.last().odometry;
