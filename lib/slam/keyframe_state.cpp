@@ -161,119 +161,44 @@ void KeyframeTracker::digest(Digest& digest) const {
   digest.add(map_.num_keyframes_ever());
 }
 
+/// What is saved beside the front end, the map and the histories, which save themselves.
+template <class Tracker, class Archive>
+void KeyframeTracker::members(Tracker& self, Archive& archive) {
+  auto& out = self.out_;
+  auto& odometry = out.odometry;
+  archive(odometry.t_us, odometry.T_frame_vehicle, odometry.velocity, odometry.angular_rate, odometry.cov_pose,
+          odometry.cov_velocity, odometry.validity);
+  archive(out.state, out.reason, out.reset_counter, out.reset_delta, out.cov_closed, out.closed_reset_counter,
+          out.closed_reset_delta);
+  archive(self.T_map_camera_, self.t_us_, self.t_good_us_, self.motion_, self.start_, self.pixels_,
+          self.landmarks_at_keyframe_);
+  archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
+          self.scale_std_, self.restarted_, self.restart_);
+}
+
 void KeyframeTracker::save(StateWriter& writer) const {
   front_end_->save(writer);
   map_.save(writer);
   writer.put(job_ != nullptr);
-  const Odometry& o = out_.odometry;
-  writer.put(o.t_us);
-  put_pose(o.T_frame_vehicle, writer);
-  for (const Eigen::Vector3d& v : {o.velocity, o.angular_rate}) writer.put(v);
-  writer.put(o.cov_pose);
-  writer.put(o.cov_velocity);
-  writer.put(o.validity);
-  writer.put(out_.state);
-  writer.put(out_.reason);
-  writer.put(out_.reset_counter);
-  put_pose(out_.reset_delta, writer);
-  put_pose(T_map_camera_, writer);
-  put_optional(t_us_, writer);
-  put_optional(t_good_us_, writer);
-  writer.put(motion_.has_value());
-  if (motion_) {
-    put_pose(motion_->T_before_now, writer);
-    writer.put(motion_->dt_s);
-  }
-  writer.put(start_.has_value());
-  if (start_) {
-    writer.put(start_->t_us);
-    writer.put(static_cast<int64_t>(start_->seen.size()));
-    for (const auto& [track, normalised] : start_->seen) {
-      writer.put(track);
-      writer.put(normalised);
-    }
-  }
-  writer.put(static_cast<int64_t>(pixels_.size()));
-  for (const auto& [track, pixel] : pixels_) {
-    writer.put(track);
-    writer.put(pixel);
-  }
-  writer.put(landmarks_at_keyframe_);
-  writer.put(cov_keyframe_);
-  writer.put(cov_closed_);
-  writer.put(continuous_);
-  writer.put(found_back_);
-  writer.put(out_.closed_reset_counter);
-  put_pose(out_.closed_reset_delta, writer);
+  SavingArchive archive(writer);
+  members(*this, archive);
   loops_.save(writer);
   wheels_.save(writer);
   ins_.save(writer);
-  writer.put(static_cast<int64_t>(new_speeds_.size()));
-  for (const SpeedSample& s : new_speeds_) put_speed(s, writer);
-  writer.put(scale_);
-  writer.put(scale_std_);
-  writer.put(restarted_);
-  writer.put(restart_.t_us);
-  put_pose(restart_.T_local_vehicle, writer);
-  writer.put(restart_.velocity);
-  writer.put(restart_.cov_pose);
 }
 
 void KeyframeTracker::load(StateReader& reader) {
   executor_.wait();
   job_.reset();
-  new_speeds_.clear();
   front_end_->load(reader);
   map_.load(reader);
   const bool bundling = reader.get<bool>();
   out_ = {};
-  Odometry& o = out_.odometry;
-  reader.get(o.t_us);
-  get_pose(o.T_frame_vehicle, reader);
-  reader.get(o.velocity);
-  reader.get(o.angular_rate);
-  reader.get(o.cov_pose);
-  reader.get(o.cov_velocity);
-  reader.get(o.validity);
-  reader.get(out_.state);
-  reader.get(out_.reason);
-  reader.get(out_.reset_counter);
-  get_pose(out_.reset_delta, reader);
-  get_pose(T_map_camera_, reader);
-  get_optional(t_us_, reader);
-  get_optional(t_good_us_, reader);
-  motion_.reset();
-  if (reader.get<bool>()) {
-    get_pose(motion_.emplace().T_before_now, reader);
-    reader.get(motion_->dt_s);
-  }
-  start_.reset();
-  if (reader.get<bool>()) {
-    reader.get(start_.emplace().t_us);
-    for (auto left = reader.get<int64_t>(); left > 0; --left) {
-      reader.get(start_->seen[reader.get<int64_t>()]);
-    }
-  }
-  pixels_.clear();
-  for (auto left = reader.get<int64_t>(); left > 0; --left) reader.get(pixels_[reader.get<int64_t>()]);
-  reader.get(landmarks_at_keyframe_);
-  reader.get(cov_keyframe_);
-  reader.get(cov_closed_);
-  reader.get(continuous_);
-  reader.get(found_back_);
-  reader.get(out_.closed_reset_counter);
-  get_pose(out_.closed_reset_delta, reader);
+  LoadingArchive archive(reader);
+  members(*this, archive);
   loops_.load(reader);
   wheels_.load(reader);
   ins_.load(reader);
-  for (auto left = reader.get<int64_t>(); left > 0; --left) new_speeds_.push_back(get_speed(reader));
-  reader.get(scale_);
-  reader.get(scale_std_);
-  reader.get(restarted_);
-  reader.get(restart_.t_us);
-  get_pose(restart_.T_local_vehicle, reader);
-  reader.get(restart_.velocity);
-  reader.get(restart_.cov_pose);
   if (bundling) begin_bundle();
 }
 

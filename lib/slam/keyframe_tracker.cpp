@@ -10,6 +10,10 @@
 namespace roadfix {
 namespace {
 
+/// Relative, of focal length times distance of the eyes as calibrations come; pictures cannot tell it. Rectified pairs
+/// are off by about this much (Cvisic et al., Recalibrating the KITTI dataset camera setup, 2021).
+constexpr double kStereoScaleStd = 0.01;
+
 /// How a camera pose's covariance becomes the vehicle's: the lever arm turns attitude error into position error.
 Matrix6d vehicle_covariance(const Matrix6d& cov_camera, const SE3& T_map_camera, const SE3& T_camera_vehicle) {
   Matrix6d F = Matrix6d::Identity();
@@ -118,7 +122,7 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   }
   t_us_ = frame.t_us;
   out_.scale = stereo_ ? ScaleSource::kStereo : scale_;
-  out_.scale_std = scale_std_;
+  out_.scale_std = stereo_ ? kStereoScaleStd : scale_std_;
   out_.num_keyframes = map_.num_keyframes_ever();
   out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
   out_.num_loops = loops_.num_loops();

@@ -15,12 +15,12 @@
 
 #include "samples/samples.h"
 #include "slam/config.h"
-#include "slam/executor.h"
 #include "slam/local_map.h"
 #include "slam/loop_closer.h"
 #include "slam/pose_solver.h"
 #include "slam/travel.h"
 #include "stream/digest.h"
+#include "stream/executor.h"
 
 namespace roadfix {
 
@@ -69,6 +69,11 @@ struct Restart {
   SE3 T_local_vehicle;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, vehicle axes
   Matrix6d cov_pose = Matrix6d::Zero();
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.t_us, self.T_local_vehicle, self.velocity, self.cov_pose);
+  }
 };
 
 class KeyframeTracker {
@@ -108,16 +113,28 @@ class KeyframeTracker {
   struct Motion {
     SE3 T_before_now;  ///< of the camera, over the last frame
     double dt_s = 0.0;
+
+    template <class Self, class Archive>
+    static void members(Self& self, Archive& archive) {
+      archive(self.T_before_now, self.dt_s);
+    }
   };
   struct Start {  ///< the first picture of a start without stereo
     int64_t t_us = 0;
     std::map<int64_t, Eigen::Vector2d> seen;  ///< normalised, by track
+
+    template <class Self, class Archive>
+    static void members(Self& self, Archive& archive) {
+      archive(self.t_us, self.seen);
+    }
   };
   struct Pairs {  ///< tracks in the first picture of a start and in this one, normalised
     std::vector<int64_t> tracks;
     std::vector<Eigen::Vector2d> first, second;
   };
 
+  template <class Tracker, class Archive>
+  static void members(Tracker& self, Archive& archive);
   [[nodiscard]] std::string unusable(const CameraFrame& frame);
   void finish_bundle();
   void begin_bundle();

@@ -185,52 +185,19 @@ void LocalMap::rescale(double factor) {
   }
 }
 
+template <class Map, class Archive>
+void LocalMap::members(Map& self, Archive& archive) {
+  archive(self.next_id_, self.lens_.value, self.lens_information_, self.keyframes_, self.landmarks_);
+}
+
 void LocalMap::save(StateWriter& writer) const {
-  writer.put(next_id_);
-  writer.put(lens_.value);
-  writer.put(lens_information_);
-  writer.put(static_cast<int64_t>(keyframes_.size()));
-  for (const Keyframe& k : keyframes_) {
-    writer.put(k.id);
-    writer.put(k.t_us);
-    put_pose(k.T_map_camera, writer);
-    put_optional(k.held_distance, writer);
-  }
-  writer.put(static_cast<int64_t>(landmarks_.size()));
-  for (const auto& [track, landmark] : landmarks_) {
-    writer.put(track);
-    put_optional(landmark.p_map, writer);
-    writer.put(static_cast<int64_t>(landmark.sightings.size()));
-    for (const Sighting& s : landmark.sightings) {
-      writer.put(s.keyframe);
-      writer.put(s.left);
-      put_optional(s.right, writer);
-    }
-  }
+  SavingArchive archive(writer);
+  members(*this, archive);
 }
 
 void LocalMap::load(StateReader& reader) {
-  clear();
-  reader.get(next_id_);
-  reader.get(lens_.value);
-  reader.get(lens_information_);
-  for (auto left = reader.get<int64_t>(); left > 0; --left) {
-    Keyframe& k = keyframes_.emplace_back();
-    reader.get(k.id);
-    reader.get(k.t_us);
-    get_pose(k.T_map_camera, reader);
-    get_optional(k.held_distance, reader);
-  }
-  for (auto left = reader.get<int64_t>(); left > 0; --left) {
-    Landmark& landmark = landmarks_[reader.get<int64_t>()];
-    get_optional(landmark.p_map, reader);
-    for (auto sightings = reader.get<int64_t>(); sightings > 0; --sightings) {
-      Sighting& s = landmark.sightings.emplace_back();
-      reader.get(s.keyframe);
-      reader.get(s.left);
-      get_optional(s.right, reader);
-    }
-  }
+  LoadingArchive archive(reader);
+  members(*this, archive);
 }
 
 void LocalMap::clear() {

@@ -19,11 +19,21 @@ struct Sighting {
   int64_t keyframe = 0;
   Eigen::Vector2d left;
   std::optional<Eigen::Vector2d> right;
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.keyframe, self.left, self.right);
+  }
 };
 
 struct Landmark {
   std::optional<Eigen::Vector3d> p_map;  ///< m, once two rays have made it a point
   std::vector<Sighting> sightings;       ///< in ascending order of keyframe
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.p_map, self.sightings);
+  }
 };
 
 struct Keyframe {
@@ -31,6 +41,11 @@ struct Keyframe {
   int64_t t_us = 0;
   SE3 T_map_camera;                     ///< of the left eye
   std::optional<double> held_distance;  ///< to the keyframe before: a unit of length, where nothing else gives one
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.id, self.t_us, self.T_map_camera, self.held_distance);
+  }
 };
 
 /// What a keyframe sees of one track.
@@ -81,6 +96,8 @@ class LocalMap {
   [[nodiscard]] int64_t num_keyframes_ever() const { return next_id_; }
 
  private:
+  template <class Map, class Archive>
+  static void members(Map& self, Archive& archive);
   void make_points();
   void learn_lens(const BundleJob& job);
   void forget_old_keyframes();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "samples/samples.h"
+#include "slam/state_io.h"
 
 namespace roadfix {
 namespace {
@@ -14,20 +15,6 @@ constexpr double kUnseenAcceleration = 1.5;
 constexpr double kNoiseCorrelation_s = 0.1;
 
 }  // namespace
-
-void put_speed(const SpeedSample& sample, StateWriter& writer) {
-  writer.put(sample.t_us);
-  writer.put(sample.source);
-  for (const double x : {sample.speed, sample.sigma, sample.scale_std}) writer.put(x);
-}
-
-SpeedSample get_speed(StateReader& reader) {
-  SpeedSample sample;
-  reader.get(sample.t_us);
-  reader.get(sample.source);
-  for (double* x : {&sample.speed, &sample.sigma, &sample.scale_std}) reader.get(*x);
-  return sample;
-}
 
 void TravelHistory::add(const SpeedSample& sample) {
   if (!marks_.empty() && sample.t_us <= marks_.back().sample.t_us) return;
@@ -78,22 +65,8 @@ std::optional<Travel> TravelHistory::between(int64_t begin_us, int64_t end_us) c
   return travel;
 }
 
-void TravelHistory::save(StateWriter& writer) const {
-  writer.put(static_cast<int64_t>(marks_.size()));
-  for (const Mark& m : marks_) {
-    put_speed(m.sample, writer);
-    writer.put(m.way);
-  }
-}
+void TravelHistory::save(StateWriter& writer) const { SavingArchive{writer}(marks_); }
 
-void TravelHistory::load(StateReader& reader) {
-  marks_.clear();
-  const auto count = reader.get<int64_t>();
-  for (int64_t i = 0; i < count; ++i) {
-    Mark& m = marks_.emplace_back();
-    m.sample = get_speed(reader);
-    reader.get(m.way);
-  }
-}
+void TravelHistory::load(StateReader& reader) { LoadingArchive{reader}(marks_); }
 
 }  // namespace roadfix

@@ -17,10 +17,12 @@ struct SpeedSample {
   double speed = 0.0;      ///< m/s, magnitude
   double sigma = 0.0;      ///< m/s, noise of one sample
   double scale_std = 0.0;  ///< relative, the same for all samples of the source
-};
 
-void put_speed(const SpeedSample& sample, StateWriter& writer);
-SpeedSample get_speed(StateReader& reader);
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.t_us, self.source, self.speed, self.sigma, self.scale_std);
+  }
+};
 
 struct Travel {
   double distance = 0.0;  ///< m
@@ -48,6 +50,11 @@ class TravelHistory {
   struct Mark {
     SpeedSample sample;
     double way = 0.0;  ///< m since the first sample ever
+
+    template <class Self, class Archive>
+    static void members(Self& self, Archive& archive) {
+      archive(self.sample, self.way);
+    }
   };
   [[nodiscard]] double way_at(int64_t t_us) const;
   [[nodiscard]] double doubt_at(int64_t t_us) const;

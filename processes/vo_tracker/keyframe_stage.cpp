@@ -8,6 +8,7 @@
 #include "bus/sample_codec.h"
 #include "config/config.h"
 #include "slam/keyframe_tracker.h"
+#include "stream/thread_pool.h"
 #include "vo_tracker/camera_rig.h"
 #include "vo_tracker/messages.h"
 #include "vo_tracker/picture.h"
@@ -23,7 +24,7 @@ constexpr int64_t kWheels_us = 50'000;       // the lateness of WHEELS there
 constexpr int64_t kCameraLost_us = 250'000;  // a few frames: then the left camera goes on alone
 
 std::unique_ptr<Executor> make_executor(int threads) {
-  if (threads > 1) return std::make_unique<ThreadExecutor>();
+  if (threads > 1) return std::make_unique<ThreadPool>(1);  // bundle adjustment beside the tracking, no loops
   return std::make_unique<InlineExecutor>();
 }
 

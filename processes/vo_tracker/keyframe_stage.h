@@ -8,8 +8,8 @@
 
 #include "bus/stage.h"
 #include "camera/stamp_filter.h"
+#include "stream/executor.h"
 #include "vo_tracker/handler.h"
-#include "vo_tracker/thread_executor.h"
 
 namespace roadfix {
 
