@@ -18,6 +18,12 @@ double robust_cost(double r2, double huber) {
   return r2 <= huber * huber ? 0.5 * r2 : huber * (std::sqrt(r2) - 0.5 * huber);
 }
 double robust_weight(double r2, double huber) { return r2 <= huber * huber ? 1.0 : huber / std::sqrt(r2); }
+/// The mean over all directions of Huber's second derivative: beyond the knee the cost is a cone, straight outwards and
+/// as curved as its weight around, (M.13a).
+double robust_curvature(double r2, double huber) { return r2 <= huber * huber ? 1.0 : 0.5 * robust_weight(r2, huber); }
+
+/// What linearise() is for: steps take the weight as curvature too, which always leads downhill; a covariance must not.
+enum class Purpose { kStep, kCovariance };
 
 class Eyes {
  public:
@@ -61,7 +67,8 @@ double cost_of(const BundleProblem& problem, std::vector<double>* error_px = nul
 }
 
 /// (M.9)
-NormalEquations linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free) {
+NormalEquations linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free,
+                          Purpose purpose = Purpose::kStep) {
   NormalEquations equations(num_free, problem.points.size());
   const Eyes eyes(problem);
   const double scale = problem.focal_px / problem.sigma_px;
@@ -74,8 +81,9 @@ NormalEquations linearise(const BundleProblem& problem, const std::vector<int>& 
     J.pose *= scale;
     J.point *= scale;
     J.correction *= scale;
-    equations.add(free[static_cast<size_t>(o.view)], point, J, residual,
-                  robust_weight(residual.squaredNorm(), problem.huber));
+    const double r2 = residual.squaredNorm(), slope = robust_weight(r2, problem.huber);
+    const double curvature = purpose == Purpose::kStep ? slope : robust_curvature(r2, problem.huber);
+    equations.add(free[static_cast<size_t>(o.view)], point, J, residual, {slope, curvature});
   }
   for (const BundleProblem::Distance& d : problem.distances) {
     const Eigen::Vector3d between = separation(problem, d);
@@ -130,6 +138,7 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
     if (enough) break;
   }
   report.cost_after = cost_of(problem, &report.error_px);
+  equations = linearise(problem, free, num_free, Purpose::kCovariance);
   const Eigen::MatrixXd cov = equations.covariance();
   if (num_free > 0) {
     const int row = 6 * (num_free - 1);

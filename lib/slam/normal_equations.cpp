@@ -16,22 +16,24 @@ NormalEquations::NormalEquations(int num_free_views, size_t num_points)
       points_(num_points) {}
 
 void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual,
-                          double weight) {
+                          Weight weight) {
   Point& p = points_[point];
-  const Eigen::Matrix<double, 3, 2> Jp = weight * J.point.transpose();
+  const Eigen::Vector2d pull = weight.slope * residual;
+  const Eigen::Matrix<double, 3, 2> Jp = weight.curvature * J.point.transpose();
   p.H.noalias() += Jp * J.point;
-  p.b.noalias() += Jp * residual;
-  const Eigen::Matrix<double, kLens, 2> Jl = weight * J.correction.transpose();
+  p.b.noalias() += J.point.transpose() * pull;
+  const Eigen::Matrix<double, kLens, 2> Jl = weight.curvature * J.correction.transpose();
+  const LensCorrection::Vector b_lens = J.correction.transpose() * pull;
   p.W_lens.noalias() += Jl * J.point;
   H_.block<kLens, kLens>(lens_row_, lens_row_).noalias() += Jl * J.correction;
-  p.b_lens.noalias() += Jl * residual;
-  b_.segment<kLens>(lens_row_).noalias() += Jl * residual;
+  p.b_lens += b_lens;
+  b_.segment<kLens>(lens_row_) += b_lens;
   if (free_view < 0) return;
-  const Eigen::Matrix<double, 6, 2> Jv = weight * J.pose.transpose();
+  const Eigen::Matrix<double, 6, 2> Jv = weight.curvature * J.pose.transpose();
   const int row = 6 * free_view;
   H_.block<6, 6>(row, row).noalias() += Jv * J.pose;
   H_.block<kLens, 6>(lens_row_, row).noalias() += Jl * J.pose;
-  const Vector6d b = Jv * residual;
+  const Vector6d b = J.pose.transpose() * pull;
   b_.segment<6>(row) += b;
   if (p.links_end == links_.size() && p.links_end > 0 && links_.back().free_view == free_view) {
     links_.back().W.noalias() += Jv * J.point;  // the other eye of the same view
@@ -147,8 +149,8 @@ Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& cov
     }
     begin = end;
   }
-  // The fit has taken its own share out of the residuals.
-  const auto n = static_cast<double>(clusters), unknowns = static_cast<double>(scatter.rows());
+  // The fit has taken its own share out of the residuals. A track whose errors are all alike still brings two numbers.
+  const auto n = 2.0 * static_cast<double>(clusters), unknowns = static_cast<double>(scatter.rows());
   const double shrunk = n > 2.0 * unknowns ? n / (n - unknowns) : 2.0;
   const Eigen::MatrixXd whole = scatter.selfadjointView<Eigen::Lower>();
   return shrunk * covariance * whole * covariance;

@@ -14,9 +14,15 @@ class NormalEquations {
  public:
   NormalEquations(int num_free_views, size_t num_points);
 
+  /// How much one observation counts: by the slope of its robust cost in b, by its curvature in H.
+  struct Weight {
+    double slope = 1.0;
+    double curvature = 1.0;
+  };
+
   /// One observation, residual and derivatives already divided by sigma; `free_view` is -1 for a fixed one.
   /// Observations come in ascending order of point, then of view.
-  void add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual, double weight);
+  void add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual, Weight weight);
 
   /// A residual on the positions of two views; either may be fixed (-1).
   void add_distance(int free_a, int free_b, const Eigen::Vector3d& J_b, double residual);

@@ -14,6 +14,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "evaluation/alignment.h"
 #include "geometry/determinism.h"
 #include "slam/keyframe_tracker.h"
 
@@ -67,17 +68,26 @@ Sequence load(const std::filesystem::path& folder, bool mono) {
   return s;
 }
 
-/// RMSE of positions after the best SE3 or Sim3 (Umeyama 1991).
-double ate(const std::vector<Eigen::Vector3d>& estimate, const std::vector<Eigen::Vector3d>& reference, bool scale) {
-  const auto n = static_cast<Eigen::Index>(estimate.size());
-  Eigen::MatrixXd from(3, n), to(3, n);  // rows fixed at compile time make GCC 12 warn inside Eigen
-  for (Eigen::Index i = 0; i < n; ++i) {
-    from.col(i) = estimate[static_cast<size_t>(i)];
-    to.col(i) = reference[static_cast<size_t>(i)];
+/// RMSE of positions after the best alignment of that kind.
+double ate(const std::vector<PosePair>& pairs, Alignment alignment) {
+  const auto S = align(pairs, alignment);
+  if (!S) return std::nan("");
+  if (alignment == Alignment::kSim3) std::printf("scale %.4f ", S->scale);
+  double sum = 0.0;
+  for (const PosePair& pair : pairs) {
+    sum += (transformed(*S, pair.estimate).T_frame_vehicle.p - pair.reference.T_frame_vehicle.p).squaredNorm();
   }
-  const Eigen::Matrix4d T = Eigen::umeyama(from, to, scale);
-  if (scale) std::printf("scale %.4f ", T.topLeftCorner<3, 3>().col(0).norm());
-  return std::sqrt((T.topRows<3>() * from.colwise().homogeneous() - to).squaredNorm() / static_cast<double>(n));
+  return std::sqrt(sum / static_cast<double>(pairs.size()));
+}
+
+/// Median sigma of the position, m.
+double median_sigma(const std::vector<PosePair>& pairs) {
+  std::vector<double> sigmas;
+  for (const PosePair& pair : pairs) {
+    sigmas.push_back(std::sqrt(pair.estimate.cov_pose.topLeftCorner<3, 3>().trace()));
+  }
+  std::sort(sigmas.begin(), sigmas.end());
+  return sigmas.empty() ? 0.0 : sigmas[sigmas.size() / 2];
 }
 
 /// Sets one configuration key from text, in whatever group it stands.
@@ -143,7 +153,7 @@ int run(int argc, char** argv) {
   const Sequence s = load(folder, mono);
   InlineExecutor executor;
   KeyframeTracker tracker(config, s.rig, make_front_end(config.front_end, weights), executor);
-  std::vector<Eigen::Vector3d> estimate, reference;
+  std::vector<PosePair> pairs;
   std::vector<double> cost;
   double decode = 0.0, inliers = 0.0, matches = 0.0;
   int valid = 0, frames = 0;
@@ -173,8 +183,8 @@ int run(int argc, char** argv) {
                   out.odometry.T_frame_vehicle.p.z(), std::sqrt(out.odometry.cov_pose.topLeftCorner<3, 3>().trace()),
                   out.reason.c_str());
     if (ok && i >= from && static_cast<size_t>(i) < s.reference.size()) {
-      estimate.push_back(out.odometry.T_frame_vehicle.p);
-      reference.push_back(s.reference[static_cast<size_t>(i)]);
+      pairs.push_back({out.odometry, {}});
+      pairs.back().reference.T_frame_vehicle.p = s.reference[static_cast<size_t>(i)];
     }
   }
   std::printf("lens %.4f %.4f %.5f %.5f %.5f ", tracker.lens().value(0), tracker.lens().value(1),
@@ -186,11 +196,10 @@ int run(int argc, char** argv) {
   getrusage(RUSAGE_SELF, &usage);
   std::printf(
       "valid %d/%d ate_se3 %.3f m ate_sim3 %.3f m cpu %.2f ms p99 %.2f ms (decode %.2f) matches %.3f inliers %.3f "
-      "keyframes %ld rss "
-      "%.0f MB\n",
-      valid, frames, ate(estimate, reference, false), ate(estimate, reference, true), total / frames,
+      "keyframes %ld sigma %.3f m rss %.0f MB\n",
+      valid, frames, ate(pairs, Alignment::kSe3), ate(pairs, Alignment::kSim3), total / frames,
       cost[cost.size() * 99 / 100], decode / frames, matches / frames, inliers / frames, tracker.last().num_keyframes,
-      static_cast<double>(usage.ru_maxrss) / 1024.0);
+      median_sigma(pairs), static_cast<double>(usage.ru_maxrss) / 1024.0);
   return 0;
 }
 

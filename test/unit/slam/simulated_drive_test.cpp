@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
+#include <random>
 
 #include "geometry/determinism.h"
 #include "simulation/scene/street.h"
@@ -39,7 +40,8 @@ struct Drive {
   int valid = 0;
 };
 
-Drive drive(uint64_t seed, bool stereo, double noise_px) {
+/// `focal_error`: relative, of the calibration that the tracker is given.
+Drive drive(uint64_t seed, bool stereo, double noise_px, double focal_error) {
   fix_eigen_blocking();
   StreetPlan plan;
   for (int i = -10; i < kFrames + 60; ++i) {
@@ -51,10 +53,11 @@ Drive drive(uint64_t seed, bool stereo, double noise_px) {
   const World world = build_world(plan);
   CameraRig rig;
   rig.left = kLens;
+  rig.left.fx = rig.left.fy = kLens.fx * (1.0 + focal_error);
   rig.T_vehicle_left = kVehicleLeft;
   const SE3 T_left_right{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, 0.0}};
   if (stereo) {
-    rig.right = kLens;
+    rig.right = rig.left;
     rig.T_right_left = T_left_right.inverse();
   }
   TrackConfig tracks;
@@ -74,6 +77,9 @@ Drive drive(uint64_t seed, bool stereo, double noise_px) {
   for (int i = 0; i < static_cast<int>(picture.total()); ++i) picture.data[i] = static_cast<uint8_t>(37 * i);
 
   Drive result;
+  constexpr double kSpeedSigma = 0.01;  // m/s
+  std::mt19937 random(static_cast<unsigned>(seed));
+  std::normal_distribution<double> speed_noise(0.0, kSpeedSigma);
   std::optional<SE3> T_local_enu;
   for (int i = 0; i < kFrames; ++i) {
     const SE3 T_enu_vehicle = true_pose(i, seed);
@@ -83,7 +89,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px) {
     seen->now.clear();
     for (const TrackObservation& o : simulator.observe(view)) seen->now.emplace(o.id, o);
     const int64_t t_us = 100'000 * (i + 1);
-    if (!stereo) tracker.speed({t_us, SpeedSource::kWheels, kStep / 0.1, 0.01, 0.0});
+    if (!stereo) tracker.speed({t_us, SpeedSource::kWheels, kStep / 0.1 + speed_noise(random), kSpeedSigma, 0.0});
     const TrackedFrame& out = tracker.process({t_us, picture, stereo ? picture : cv::Mat()});
     const Odometry& o = out.odometry;
     if (o.validity != Validity::kValid) continue;
@@ -101,11 +107,11 @@ struct Drives {
   double nees = 0.0, error = 0.0, sigma = 0.0;  ///< mean, and two medians
 };
 
-Drives drives(int count, bool stereo, double noise_px) {
+Drives drives(int count, bool stereo, double noise_px, double focal_error = 0.0) {
   Drives all;
   std::vector<double> errors, sigmas;
   for (int seed = 1; seed <= count; ++seed) {
-    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px);
+    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px, focal_error);
     CHECK(one.valid >= kFrames - 10);
     all.nees += one.nees / count;
     errors.push_back(one.error);
@@ -119,6 +125,7 @@ Drives drives(int count, bool stereo, double noise_px) {
 }
 
 TEST_CASE("the covariance is that of the errors, whatever the noise", "[statistics]") {
+  double mean = 0.0;
   for (const bool stereo : {true, false}) {
     for (const double noise_px : {0.3, 0.6}) {
       const Drives d = drives(20, stereo, noise_px);
@@ -127,8 +134,12 @@ TEST_CASE("the covariance is that of the errors, whatever the noise", "[statisti
                   noise_px, d.nees, d.error, d.sigma);
       CHECK(d.nees > 0.5);
       CHECK(d.nees < 2.0);
+      mean += 0.25 * d.nees;
     }
   }
+  CHECK(mean > 0.7);
+  CHECK(mean < 1.5);
+  CHECK(drives(3, true, 0.3, 0.005).nees > 3.0);  // teeth: an error that all tracks share
 }
 
 }  // namespace
