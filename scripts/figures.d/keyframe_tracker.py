@@ -26,7 +26,7 @@ def bench(runs, *flags, repeat=0):
     def run():
         text = runs.call(runs.program("keyframe_tracker_bench"), runs.drive(KITTI), *flags)
         line = text.strip().splitlines()[-1]
-        found = dict(re.findall(r"(ate_se3|ate_sim3|cpu|p99|decode|matches|inliers|keyframes|rss) (\d+\.?\d*)", line))
+        found = dict(re.findall(r"(ate_se3|ate_sim3|cpu|p99|decode|matches|inliers|keyframes|sigma|rss) (\d+\.?\d*)", line))
         valid, frames = re.search(r"valid (\d+)/(\d+)", line).groups()
         return {key: float(value) for key, value in found.items()} | {"valid": int(valid), "frames": int(frames)}
 
@@ -90,8 +90,8 @@ MEASUREMENTS = {
 
 def print_table(runs):
     """Every front end, stereo and mono; a front end without its weights is left out."""
-    print("| front end | eyes | tracked | matches | inliers | ATE m | CPU ms | p99 ms | keyframes | RSS MB |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print("| front end | eyes | tracked | matches | inliers | ATE m | sigma m | CPU ms | p99 ms | keyframes | RSS MB |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     for kind in ("klt", "orb", "sift", "superpoint"):
         flags = ["--set", f"kind={kind}"]
         if kind == "superpoint":
@@ -102,7 +102,7 @@ def print_table(runs):
         for eyes, extra, ate in (("stereo", ["--count", "100"], "ate_se3"), ("mono", ["--mono"], "ate_sim3")):
             b = bench(runs, *extra, *flags)
             print(f"| {kind} | {eyes} | {b['valid']}/{b['frames']} | {b['matches']:.3f} | {b['inliers']:.3f} | "
-                  f"{b[ate]:.3f} | {b['cpu']:.1f} | {b['p99']:.1f} | {b['keyframes']:.0f} | {b['rss']:.0f} |", flush=True)
+                  f"{b[ate]:.3f} | {b['sigma']:.3f} | {b['cpu']:.1f} | {b['p99']:.1f} | {b['keyframes']:.0f} | {b['rss']:.0f} |", flush=True)
 
 
 if __name__ == "__main__":
