@@ -19,7 +19,9 @@ AidingRecord not_ready(AidingSource source, int64_t t_us) {
 }
 
 Measurement<3> position_of(const InsCore& core, const Pending& p, const Eigen::Vector3d& lever) {
-  return gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()), lever);
+  Measurement<3> m = gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()), lever);
+  m.alike = p.alike;
+  return m;
 }
 
 }  // namespace
@@ -61,16 +63,8 @@ AidingRecord AidingApplier::apply_level(InsCore& core, const Pending& p, const G
   level.residual = all.residual.head<2>();
   level.H = all.H.topRows<2>();
   level.R = all.R.topLeftCorner<2, 2>();
+  level.alike = p.alike;
   return core.fuse(AidingSource::kGnssPosition, p.t_us, level, gates.nis[2]);
-}
-
-AidingRecord AidingApplier::apply_height(InsCore& core, const Pending& p, const Gates& gates) const {
-  const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
-  Measurement<1> height;
-  height.residual = all.residual.tail<1>();
-  height.H = all.H.bottomRows<1>();
-  height.R = all.R.bottomRightCorner<1, 1>();
-  return core.fuse(AidingSource::kGnssPosition, p.t_us, height, gates.nis[1]);
 }
 
 AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates& gates) const {

@@ -21,9 +21,8 @@ class AidingApplier {
 
   /// The measurement as it is, at core's epoch; `gate` widens (or narrows) the configured one.
   AidingRecord apply(InsCore& core, const Pending& p, const Gates& gates) const;
-  /// Only the level part, or only the height, of a position.
+  /// Only the level part of a position.
   AidingRecord apply_level(InsCore& core, const Pending& p, const Gates& gates) const;
-  AidingRecord apply_height(InsCore& core, const Pending& p, const Gates& gates) const;
 
   /// Each learns its noise where `learns`.
   AidingRecord sideslip(InsCore& core, const Gates& gates, bool learns);

@@ -64,6 +64,7 @@ struct AidingConfig {
   bool use_wheels = true;
   bool use_zero_velocity = true;
   bool use_mag = true;
+  bool use_error_correlation = true;  ///< of successive GNSS positions
 };
 
 /// The no-sideslip constraint's noise, one learner for each axis.
@@ -152,6 +153,7 @@ void visit(AidingConfig& c, Visitor& v) {
   v.boolean("use_wheels", c.use_wheels);
   v.boolean("use_zero_velocity", c.use_zero_velocity);
   v.boolean("use_mag", c.use_mag);
+  v.boolean("use_error_correlation", c.use_error_correlation);
 }
 
 template <class Visitor>

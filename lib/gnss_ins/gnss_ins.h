@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "gnss_ins/apply_aiding.h"
+#include "gnss_ins/error_correlation.h"
 #include "gnss_ins/gnss_screen.h"
 #include "gnss_ins/heading_bank.h"
 #include "gnss_ins/imu_ring.h"
 #include "gnss_ins/jump_judge.h"
-#include "gnss_ins/noise_scale.h"
 
 namespace roadfix {
 
@@ -41,7 +41,9 @@ struct GnssInsOutput {
   Odometry odometry;   ///< imu origin and axes in the anchor's enu
   std::string reason;  ///< plain words, empty when all is well
   int reset_counter = 0;
-  SE3 reset_delta;  ///< of the last jump: p new minus old in enu; q_old^-1 q_new
+  /// Of the last jump: p new minus old in enu; q_old^-1 q_new. Where the filter was aligned again, from the last pose
+  /// of the old one to the first of the new: the way driven between is in it.
+  SE3 reset_delta;
 };
 
 class GnssIns {
@@ -56,6 +58,11 @@ class GnssIns {
 
   /// Nothing before the first fix.
   [[nodiscard]] std::optional<Geodetic> anchor() const { return anchor_; }
+  /// What an earlier drive left, before the first start of this one; later it changes nothing.
+  void recall(const InsMemory& memory);
+  /// What this drive leaves to the next; nothing until aligned.
+  [[nodiscard]] std::optional<InsMemory> memory() const;
+
   [[nodiscard]] GnssInsOutput output();
   [[nodiscard]] GnssInsStatus status() const;
   /// Filter in use (the leading hypothesis while aligning); nothing before alignment starts.
@@ -73,16 +80,21 @@ class GnssIns {
   void step_aligned(const ImuSample& imu, bool block_done);
   void step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done);
   void try_start(const ImuSample& imu);
+  void try_parked(const ImuSample& imu);
+  [[nodiscard]] bool stands_as_parked(const ImuBlock& block) const;
+  void begin(StartState start);
   bool standing_now(const InsCore& core) const;
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
-  void use_position(const Pending& p);
+  void use_position(const Pending& measured);
+  [[nodiscard]] bool velocity_confirmed(int64_t t_us) const;
   void recover(const Pending& p);
   void align_again();
   [[nodiscard]] bool moved_meanwhile(double dt) const;
   [[nodiscard]] ImuNoise noise_over(double dt) const;
   void remember(const GnssFix& fix);
   void note(AidingRecord record, int64_t id);
+  void forget_before(int64_t t_us);
   void rebase_forward();
   template <class Archive>
   void serialise(Archive& a);
@@ -90,7 +102,8 @@ class GnssIns {
   GnssInsConfig config_;
   AidingApplier applier_;
   Gates gates_, no_gates_;
-  NoiseScale position_noise_, velocity_noise_;
+  std::array<PositionQuality, 6> position_quality_;  // by FixType
+  NoiseScale velocity_noise_;
   ImuMonitor monitor_;
   GnssScreen screen_;
   ImuRing ring_;
@@ -110,7 +123,12 @@ class GnssIns {
   Eigen::Matrix3d cov_velocity_ = Eigen::Matrix3d::Zero();
   int64_t next_sideslip_us_ = 0, next_heave_us_ = 0;
   int64_t last_mag_us_ = 0, last_wheel_us_ = 0, wheels_at_us_ = 0;
+  std::optional<InsMemory> recalled_;
+  int64_t first_step_us_ = 0;
+  bool unseen_ = false;                      // started where it was parked, and no position has agreed yet
   std::optional<GnssFix> fix_, fix_before_;  // good ones, for the start
+  int64_t last_fix_us_ = 0;                  // the last one that passed, to know it when it comes again
+  Geodetic last_fix_;
   std::optional<double> wheel_speed_;
   std::array<int64_t, kAidingSources> used_at_us_{};
   int64_t coasting_since_us_ = 0;
@@ -119,7 +137,10 @@ class GnssIns {
   JumpJudge jump_;
   int64_t agreed_since_us_ = 0;  // first position taken since the last start or recovery
   int64_t recovered_at_us_ = 0;
-  bool lost_ = false;  // to be aligned again
+  int64_t position_at_us_ = 0;    // stamp of the last position tried
+  double fix_interval_ = 1.0;     // s, between the last two that came without an outage
+  std::optional<SE3> abandoned_;  // last pose of a filter that was given up
+  bool lost_ = false;             // to be aligned again
   int reset_counter_ = 0;
   SE3 reset_delta_;
   int64_t bad_imu_ = 0, gaps_ = 0;

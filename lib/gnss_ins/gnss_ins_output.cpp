@@ -121,8 +121,9 @@ GnssInsOutput GnssIns::output() {
   } else if (!(horizontal < config_.alignment.invalid_sigma_m)) {
     out.reason = "position too uncertain";
   } else {
-    out.odometry.validity = s.coasting ? Validity::kCoasting : Validity::kValid;
+    out.odometry.validity = s.coasting || unseen_ ? Validity::kCoasting : Validity::kValid;
     if (s.coasting) out.reason = "coasting without GNSS";
+    if (unseen_) out.reason = "from the place where it was parked, without GNSS yet";
     if (s.imu_frozen) out.reason = "IMU readings do not change";
   }
   return out;

@@ -2,17 +2,24 @@
 #include <cmath>
 
 #include "geodesy/gravity.h"
+#include "geometry/euler.h"
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 #include "gnss_ins/gnss_ins.h"
 
 namespace roadfix {
 
 namespace {
 
-constexpr double kFixMaxAge = 2.5;        // s, of a fix to start from
-constexpr double kFixMaxSpacing = 3.0;    // s, between two fixes that give a velocity
-constexpr double kFixMinSpacing = 0.5;    // s
-constexpr double kStandingSpeed = 0.3;    // m/s
+constexpr double kFixMaxAge = 2.5;      // s, of a fix to start from
+constexpr double kFixMaxSpacing = 3.0;  // s, between two fixes that give a velocity
+constexpr double kFixMinSpacing = 0.5;  // s
+constexpr double kStandingSpeed = 0.3;  // m/s
+constexpr double kParkedSlack = 3.0;    // m, by which fixes may miss the place beyond their sigma (another bay is 2.5)
+constexpr double kParkedPlace = 0.5;    // m, by which a parked car may have been rolled
+constexpr double kParkedSigma = 10.0;   // m; a place known worse is not worth keeping
+constexpr double kParkedTilt = 0.02;    // rad; more, and it stands elsewhere
+constexpr double kNoFixWait = 5.0;      // s for a first fix, before a start without
 constexpr double kCarAcceleration = 2.0;  // m/s2, by which a mean velocity may differ from the present one
 
 struct StartVelocity {
@@ -80,9 +87,69 @@ void GnssIns::try_start(const ImuSample& imu) {
     s.yaw_std =
         std::max(fix_->heading->sigma, config_.aiding.heading_floor * kDegree) + config_.vehicle.mounting_std.z();
   }
+  if (recalled_ && recalled_->parked && s.standing && stands_as_parked(b)) {
+    const Eigen::Vector3d parked = enu_->enu(recalled_->place) + recalled_->q_enu_imu * config_.vehicle.p_imu_antenna;
+    const double sigma = std::sqrt(s.antenna_cov(0, 0) + s.antenna_cov(1, 1)) + recalled_->place_sigma;
+    if ((s.antenna - parked).head<2>().norm() < kParkedSlack + 3.0 * sigma) s.parked_yaw = yaw_of(recalled_->q_enu_imu);
+  }
+  begin(s);
+}
+
+// In a garage: no fix, but it stands as it was parked.
+void GnssIns::try_parked(const ImuSample& imu) {
+  if (!recalled_ || !recalled_->parked || seconds_between(first_step_us_, imu.t_us) < kNoFixWait) return;
+  const ImuBlock& b = monitor_.block();
+  if (monitor_.frozen() || !calm(b, monitor_.noise()) || !stands_as_parked(b)) return;
+  anchor_ = recalled_->place;
+  enu_.emplace(*anchor_);
+  StartState s;
+  s.t_us = imu.t_us;
+  s.standing = true;
+  s.mean_gyro = b.gyro;
+  s.mean_accel = b.accel;
+  s.accel_std = config_.alignment.standing_accel_std;
+  s.velocity_std = config_.alignment.velocity_std_standing;
+  s.antenna = recalled_->q_enu_imu * config_.vehicle.p_imu_antenna;
+  const double sigma = std::hypot(recalled_->place_sigma, kParkedPlace);
+  s.antenna_cov = sigma * sigma * Eigen::Matrix3d::Identity();
+  s.parked_yaw = yaw_of(recalled_->q_enu_imu);
+  unseen_ = true;
+  begin(s);
+}
+
+bool GnssIns::stands_as_parked(const ImuBlock& b) const {
+  const Eigen::Vector3d bias = recalled_->value.segment<3>(kAccelBias - InsMemory::kFirst);
+  const Eigen::Vector3d up = (b.accel - bias).normalized();
+  const Eigen::Vector3d was = recalled_->q_enu_imu.conjugate() * Eigen::Vector3d::UnitZ();
+  return up.cross(was).norm() < kParkedTilt;
+}
+
+void GnssIns::begin(StartState s) {
+  s.memory = recalled_;
+  // What is older made the start, or lies too far back to be carried over an unknown acceleration: fixes of the second
+  // before, taken at this epoch as if the velocity had been constant, once turned a start by five degrees of pitch.
+  forget_before(s.t_us + 1);
   bank_.start(*anchor_, s);
   forward_stale_ = true;
   phase_ = AlignmentPhase::kHeading;
+}
+
+void GnssIns::recall(const InsMemory& memory) {
+  if (core() == nullptr && memory.sane()) recalled_ = memory;
+}
+
+std::optional<InsMemory> GnssIns::memory() const {
+  if (phase_ != AlignmentPhase::kDone) return std::nullopt;
+  const NavState& x = core_->state();
+  const ErrorMatrix P = core_->covariance();
+  InsMemory m = remembered(x, P);
+  m.place = enu_->geodetic(x.position);
+  m.q_enu_imu = normalized_positive(Eigen::Quaterniond(enu_->R_anchor_enu_at(m.place).transpose()) * x.q_enu_imu);
+  m.place_sigma = std::sqrt(P(kPos, kPos) + P(kPos + 1, kPos + 1));
+  m.heading_sigma = core_->heading_std();
+  m.parked = standing_now(*core_) && m.heading_sigma < config_.alignment.confirm_std_deg * kDegree &&
+             m.place_sigma < kParkedSigma;
+  return m;
 }
 
 void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done) {
@@ -102,6 +169,13 @@ void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& nois
   if (!block_done || !bank_.confirmed()) return;
   core_.emplace(bank_.leader());
   core_->consider({});
+  if (abandoned_) {
+    const NavState& x = core_->state();
+    ++reset_counter_;
+    reset_delta_.p = x.position - abandoned_->p;
+    reset_delta_.q = abandoned_->q.conjugate() * x.q_enu_imu;
+    abandoned_.reset();
+  }
   bank_.stop();
   phase_ = AlignmentPhase::kDone;
   forward_stale_ = true;

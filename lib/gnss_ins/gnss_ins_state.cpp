@@ -6,24 +6,6 @@ namespace roadfix {
 
 namespace {
 
-struct Writer {
-  static constexpr bool kReads = false;
-  StateWriter out;
-  template <class... T>
-  void operator()(const T&... values) {
-    (out.put(values), ...);
-  }
-};
-
-struct Reader {
-  static constexpr bool kReads = true;
-  StateReader in;
-  template <class... T>
-  void operator()(T&&... values) {
-    (in.get(values), ...);
-  }
-};
-
 // A flag, then the value; `make` gives a reader something to fill.
 template <class Archive, class T, class Make, class Visit>
 void optional(Archive& a, std::optional<T>& value, const Make& make, const Visit& visit) {
@@ -59,7 +41,7 @@ void GnssIns::serialise(Archive& a) {
   optional(a, forward_, new_core, core_members);
   bank_.serialise(a, anchor_.value_or(Geodetic()));
   applier_.serialise(a);
-  position_noise_.serialise(a);
+  for (PositionQuality& quality : position_quality_) quality.serialise(a);
   velocity_noise_.serialise(a);
   jump_.serialise(a);
   monitor_.serialise(a);
@@ -70,15 +52,20 @@ void GnssIns::serialise(Archive& a) {
       a, fix_, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });
   optional(
       a, fix_before_, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });
+  optional(
+      a, recalled_, [] { return InsMemory(); }, [&](InsMemory& m) { m.serialise(a); });
+  optional(
+      a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
   a(phase_, lag_us_, last_step_us_, forward_to_, forward_stale_, cov_at_us_, cov_pose_, cov_velocity_,
     next_sideslip_us_, next_heave_us_, last_mag_us_, last_wheel_us_, wheels_at_us_, coasting_since_us_,
-    refused_since_us_, refused_, agreed_since_us_, recovered_at_us_, lost_, reset_counter_, reset_delta_.p,
-    reset_delta_.q.coeffs(), bad_imu_, gaps_);
+    refused_since_us_, refused_, agreed_since_us_, recovered_at_us_, position_at_us_, fix_interval_, first_step_us_,
+    unseen_, last_fix_us_, last_fix_.latitude, last_fix_.longitude, last_fix_.height, lost_, reset_counter_,
+    reset_delta_.p, reset_delta_.q.coeffs(), bad_imu_, gaps_);
   for (int64_t& t : used_at_us_) a(t);
 }
 
 std::vector<uint8_t> GnssIns::save() const {
-  Writer writer;
+  StateArchiveOut writer;
   // The writer only reads: serialise() is one list for both directions and so cannot be const.
   const_cast<GnssIns*>(this)->serialise(writer);
   return writer.out.take();
@@ -86,7 +73,7 @@ std::vector<uint8_t> GnssIns::save() const {
 
 void GnssIns::load(std::span<const uint8_t> bytes) {
   GnssIns fresh(config_);
-  Reader reader{StateReader(bytes)};
+  StateArchiveIn reader{StateReader(bytes)};
   fresh.serialise(reader);
   reader.in.finish();
   *this = std::move(fresh);

@@ -18,6 +18,9 @@ constexpr double kMostNis = 50.0;
 // until the car turns or brakes hard.
 constexpr double kReverseSpeed = 4.0;     // m/s
 constexpr double kReverseBelief = -12.0;  // log of 6e-6
+// A car that seems to stand as it was parked: how often it was turned all the same, and by how much it may be off.
+constexpr double kTurned = 1e-4;
+constexpr double kParkedYaw = 0.3 * kDegree;
 constexpr double kSameHeading = 10.0 * kDegree;
 
 // Roll and pitch that turn the mean specific force upright, with the yaw asked for.
@@ -26,7 +29,7 @@ Eigen::Quaterniond attitude(const Eigen::Vector3d& mean_accel, double yaw) {
   return (exp_q(Eigen::Vector3d(0.0, 0.0, yaw - yaw_of(level))) * level).normalized();
 }
 
-ErrorMatrix start_covariance(const GnssInsConfig& c, double yaw_std) {
+ErrorVector start_sigmas(const GnssInsConfig& c, double yaw_std) {
   const GnssInsVehicle& v = c.vehicle;
   ErrorVector std;
   std.setZero();
@@ -43,7 +46,7 @@ ErrorMatrix start_covariance(const GnssInsConfig& c, double yaw_std) {
   std(kVelocityLatency) = time.velocity_latency;
   std(kImuOffset) = time.imu_offset;
   std(kNoSlipX) = c.aiding.no_slip_x_std;
-  return std.cwiseAbs2().asDiagonal();
+  return std;
 }
 
 }  // namespace
@@ -53,30 +56,37 @@ void HeadingBank::start(const Geodetic& anchor, const StartState& s) {
   log_weights_.clear();
   leader_ = 0;
   const int n = config_.alignment.headings;
-  cores_.reserve(static_cast<size_t>(n));
-  log_weights_.reserve(static_cast<size_t>(n));
+  cores_.reserve(static_cast<size_t>(n) + 1);
+  log_weights_.reserve(static_cast<size_t>(n) + 1);
   if (s.yaw) {
-    add_hypothesis(anchor, s, *s.yaw, s.yaw_std);
+    add_hypothesis(anchor, s, *s.yaw, s.yaw_std, 0.0);
     return;
   }
   // The first points along the motion where there is one; the order decides nothing else.
   const double first = s.velocity.head<2>().norm() > 1.0 ? std::atan2(s.velocity.y(), s.velocity.x()) : 0.0;
   for (int i = 0; i < n; ++i)
-    add_hypothesis(anchor, s, wrap_angle(first + 2.0 * kPi * i / n), config_.alignment.heading_std_deg * kDegree);
+    add_hypothesis(anchor, s, wrap_angle(first + 2.0 * kPi * i / n), config_.alignment.heading_std_deg * kDegree,
+                   s.parked_yaw ? std::log(kTurned / n) : 0.0);
+  // What it stood on may have been turned: on a ferry, by a tow to the next bay.
+  if (s.parked_yaw) add_hypothesis(anchor, s, *s.parked_yaw, std::hypot(s.memory->heading_sigma, kParkedYaw), 0.0);
+  normalise();
 }
 
-void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, double yaw, double yaw_std) {
+void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, double yaw, double yaw_std,
+                                 double weight) {
   NavState x;
   x.t_us = s.t_us;
   x.q_enu_imu = attitude(s.mean_accel, yaw);
   x.velocity = s.velocity;
   x.position = s.antenna - x.q_enu_imu * config_.vehicle.p_imu_antenna;
   cores_.emplace_back(config_, anchor);
-  log_weights_.push_back(0.0);
+  log_weights_.push_back(weight);
   InsCore& core = cores_.back();
   // Delays show through velocity and acceleration, whose direction is not known yet.
   core.consider({kPositionLatency, 3});
-  core.initialise(x, start_covariance(config_, yaw_std));
+  ErrorVector sigmas = start_sigmas(config_, yaw_std);
+  if (s.memory) recall(*s.memory, x, sigmas);
+  core.initialise(x, sigmas.cwiseAbs2().asDiagonal());
   // Using what the mean came from as measurements gives every correlation: tilt with accelerometer bias, position with
   // attitude through the lever arm.
   const Eigen::Vector3d gravity = core.earth().gravity(x.position);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gnss_ins/ins_core.h"
+#include "gnss_ins/ins_memory.h"
 
 namespace roadfix {
 
@@ -23,6 +24,8 @@ struct StartState {
   double velocity_std = 1.0;
   std::optional<double> yaw;  ///< rad, vehicle, where a sensor gives it
   double yaw_std = 0.0;
+  std::optional<InsMemory> memory;   ///< of the last drive
+  std::optional<double> parked_yaw;  ///< rad, imu, where the car seems to stand as it was parked
 };
 
 class HeadingBank {
@@ -70,7 +73,7 @@ class HeadingBank {
   }
 
  private:
-  void add_hypothesis(const Geodetic& anchor, const StartState& start, double yaw, double yaw_std);
+  void add_hypothesis(const Geodetic& anchor, const StartState& start, double yaw, double yaw_std, double weight);
   void weigh(size_t i, const AidingRecord& r);
   /// Log weight of hypothesis i, with how likely a car drives as it says: forwards, unless it is slow.
   [[nodiscard]] double belief(size_t i) const;

@@ -45,7 +45,13 @@ class InsCore {
     if (record.status != AidingStatus::kAccepted) return record;
     P_ = P_now;
     sums_ = TransitionSums();
-    innovation.apply(x_, P_, m, considered_);
+    if (m.alike > 1.0) {
+      Measurement<Rows> weaker = m;
+      weaker.R *= m.alike;
+      Innovation<Rows>(P_, weaker).apply(x_, P_, weaker, considered_);
+    } else {
+      innovation.apply(x_, P_, m, considered_);
+    }
     return record;
   }
 

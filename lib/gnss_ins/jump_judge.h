@@ -14,9 +14,12 @@ class JumpJudge {
   bool judge(const AidingRecord& r, double sigmas) {
     if (r.status != AidingStatus::kGated) {
       refused_ = 0;
+      cosines_ = 0.0;
       return false;
     }
     const Eigen::Vector3d off(r.innovation[0], r.innovation[1], r.innovation[2]);
+    if (refused_ > 0) cosines_ += off.normalized().dot(last_);
+    last_ = off.normalized();
     if (refused_++ == 0) {
       first_ = off;
       steady_ = true;
@@ -27,13 +30,20 @@ class JumpJudge {
     return steady_;
   }
 
+  /// True while the refused positions lie all on one side: displaced, not noisy.
+  [[nodiscard]] bool one_sided() const { return refused_ > 1 && cosines_ > kOneSide * (refused_ - 1); }
+
   template <class Archive>
   void serialise(Archive& a) {
-    a(refused_, steady_, first_);
+    a(refused_, steady_, first_, cosines_, last_);
   }
 
  private:
+  static constexpr double kOneSide = 0.8;  // mean cosine between successive ones; of noise it is zero
+
   int refused_ = 0;
+  double cosines_ = 0.0;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();  // direction
   bool steady_ = false;
   Eigen::Vector3d first_ = Eigen::Vector3d::Zero();
 };

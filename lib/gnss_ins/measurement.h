@@ -15,6 +15,7 @@ struct Measurement {
   Eigen::Matrix<double, Rows, 1> residual = Eigen::Matrix<double, Rows, 1>::Zero();
   Eigen::Matrix<double, Rows, kStates> H = Eigen::Matrix<double, Rows, kStates>::Zero();
   Eigen::Matrix<double, Rows, Rows> R = Eigen::Matrix<double, Rows, Rows>::Identity();
+  double alike = 1.0;  ///< the update takes R times this, because errors repeat; the gate does not, (M.36)
 };
 
 enum class AidingSource {

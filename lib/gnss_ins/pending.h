@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <tuple>
 
 #include "gnss_ins/measurement.h"
 #include "samples/samples.h"
@@ -19,6 +20,8 @@ struct Pending {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();  ///< position, velocity, (yaw, -, -), (speed, -, -), field
   Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
   WheelDirection direction = WheelDirection::kSigned;
+  FixType fix_type = FixType::kNone;
+  double alike = 1.0;  ///< as Measurement::alike, when it is used
 
   /// s, age of the value at its stamp less the offset of the IMU's clock: how much earlier on the IMU's clock it was.
   [[nodiscard]] double age(const NavState& x) const {
@@ -30,13 +33,22 @@ struct Pending {
   /// s from the state's epoch to the moment of the value.
   [[nodiscard]] double ahead(const NavState& x) const { return seconds_between(x.t_us, t_us) - age(x); }
 
+  /// Of two measurements of one moment the one to use first, whichever came first.
+  [[nodiscard]] bool precedes(const Pending& other) const {
+    const auto key = [](const Pending& p) {
+      return std::tuple(p.kind, p.value.x(), p.value.y(), p.value.z(), p.cov(0, 0), p.cov(1, 1), p.cov(2, 2));
+    };
+    return t_us == other.t_us && key(*this) < key(other);
+  }
+
   template <class Archive>
   void serialise(Archive& a) {
-    a(kind, t_us, id, value, cov, direction);
+    a(kind, t_us, id, value, cov, direction, fix_type);
   }
 };
 
-/// In order of arrival; no allocation. A full queue drops the oldest and counts it.
+/// In order of arrival, those of one stamp in an order of their own; no allocation. A full queue drops the oldest and
+/// counts it.
 class PendingQueue {
  public:
   static constexpr int kCapacity = 256;
@@ -46,7 +58,10 @@ class PendingQueue {
       remove_first();
       ++dropped_;
     }
-    items_[static_cast<size_t>(size_++)] = p;
+    int at = size_++;
+    for (; at > 0 && p.precedes(items_[static_cast<size_t>(at - 1)]); --at)
+      items_[static_cast<size_t>(at)] = items_[static_cast<size_t>(at - 1)];
+    items_[static_cast<size_t>(at)] = p;
   }
 
   /// Calls use(p) for every measurement that the state x() has reached, in order, and forgets it.
@@ -63,14 +78,17 @@ class PendingQueue {
     size_ = kept;
   }
 
-  /// Forgets what is stamped before t_us, and counts it.
-  void drop_before(int64_t t_us) {
+  /// Forgets what is stamped before t_us and calls dropped(p) for each.
+  template <class Dropped>
+  void drop_before(int64_t t_us, const Dropped& dropped) {
     int kept = 0;
     for (int i = 0; i < size_; ++i) {
-      if (items_[static_cast<size_t>(i)].t_us >= t_us)
-        items_[static_cast<size_t>(kept++)] = items_[static_cast<size_t>(i)];
+      const Pending& p = items_[static_cast<size_t>(i)];
+      if (p.t_us < t_us)
+        dropped(p);
+      else
+        items_[static_cast<size_t>(kept++)] = p;
     }
-    dropped_ += size_ - kept;
     size_ = kept;
   }
 

@@ -10,24 +10,6 @@ using namespace msckf;
 
 namespace {
 
-struct Writer {
-  static constexpr bool kReads = false;
-  StateWriter out;
-  template <class... T>
-  void operator()(const T&... values) {
-    (out.put(values), ...);
-  }
-};
-
-struct Reader {
-  static constexpr bool kReads = true;
-  StateReader in;
-  template <class... T>
-  void operator()(T&&... values) {
-    (in.get(values), ...);
-  }
-};
-
 /// The number of things, then each.
 template <class Archive, class List, class Each>
 void list(Archive& a, List& items, size_t most, const Each& each) {
@@ -126,7 +108,7 @@ void Msckf::serialise(Archive& a) {
 }
 
 std::vector<uint8_t> Msckf::save() const {
-  Writer writer;
+  StateArchiveOut writer;
   // The writer only reads: serialise() is one list for both directions and so cannot be const.
   const_cast<Msckf*>(this)->serialise(writer);
   return writer.out.take();
@@ -134,7 +116,7 @@ std::vector<uint8_t> Msckf::save() const {
 
 void Msckf::load(std::span<const uint8_t> bytes) {
   Msckf fresh(config_);
-  Reader reader{StateReader(bytes)};
+  StateArchiveIn reader{StateReader(bytes)};
   fresh.serialise(reader);
   reader.in.finish();
   *this = std::move(fresh);

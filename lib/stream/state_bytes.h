@@ -107,4 +107,23 @@ class StateReader {
   std::span<const uint8_t> rest_;
 };
 
+/// Both as one kind of visitor, so that one list of members serves writing and reading: a(first, second, ...).
+struct StateArchiveOut {
+  static constexpr bool kReads = false;
+  StateWriter out;
+  template <class... T>
+  void operator()(const T&... values) {
+    (out.put(values), ...);
+  }
+};
+
+struct StateArchiveIn {
+  static constexpr bool kReads = true;
+  StateReader in;
+  template <class... T>
+  void operator()(T&&... values) {
+    (in.get(values), ...);
+  }
+};
+
 }  // namespace roadfix

@@ -2,6 +2,7 @@
 
 #include <roadfix/imu_t.hpp>
 #include <roadfix/mag_t.hpp>
+#include <roadfix/state_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
 #include "bus/message.h"
@@ -19,7 +20,7 @@ namespace {
 
 constexpr double kMicrotesla = 1e-6;
 
-enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3 };
+enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
 class GnssInsStage final : public Stage {
@@ -38,7 +39,9 @@ class GnssInsStage final : public Stage {
     spec_.inputs = {{"IMU", "imu_t", 0, 0},
                     {"GNSS", "gnss_t", 250'000, 0},
                     {"WHEELS", "wheels_t", 50'000, 0},
-                    {"MAG", "mag_t", 50'000, 0}};
+                    {"MAG", "mag_t", 50'000, 0},
+                    {"START_GNSS_INS_EKF", "state_t", 0, 0}};
+    spec_.state_layout = 2;
     spec_.clocks = {{kImu, 200'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
@@ -52,6 +55,9 @@ class GnssInsStage final : public Stage {
         break;
       case kGnss:
         filter_->add(gnss_fix(decode<gnss_t>(m.bytes)), m.seq);
+        break;
+      case kStart:
+        recall(decode<state_t>(m.bytes).state);
         break;
       case kWheels:
         filter_->add(wheel_sample(decode<wheels_t>(m.bytes)), m.seq);
@@ -106,10 +112,29 @@ class GnssInsStage final : public Stage {
     status_slot_.set_last(status_last);
   }
 
+  [[nodiscard]] std::vector<uint8_t> memory() const override {
+    std::optional<InsMemory> memory = filter_->memory();
+    return memory ? bytes_of(*memory) : std::vector<uint8_t>();
+  }
+
   [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
   [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
+  static std::vector<uint8_t> bytes_of(InsMemory& memory) {
+    StateArchiveOut out;
+    memory.serialise(out);
+    return out.out.take();
+  }
+
+  void recall(const std::vector<uint8_t>& bytes) {
+    InsMemory memory;
+    if (bytes.size() != bytes_of(memory).size()) return;  // written by another version
+    StateArchiveIn in{StateReader(bytes)};
+    memory.serialise(in);
+    filter_->recall(memory);
+  }
+
   GnssInsProcessConfig config_;
   std::string calibration_;
   GnssInsConfig filter_config_;

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "bus/log_reader.h"
+#include "bus/stage_memory.h"
 #include "bus/stage_runner.h"
 #include "roadfix/stages.h"
 #include "support/shared_data.h"
@@ -132,5 +133,44 @@ TEST_CASE("four stages beside each other in threads: the same bytes as alone") {
       REQUIRE(published.outputs == alone.outputs);
       REQUIRE(published.states == alone.states);
     }
+  }
+}
+
+namespace {
+
+/// What a stage remembers after the demo drive, where it began with `memory` (empty: with none).
+std::vector<uint8_t> remembered(const std::string& stage, const std::vector<uint8_t>& memory) {
+  Published published;
+  StageRunner runner(std::move(make_stages({stage}, test::source_path("configs/demo")).front()), published);
+  const StageSpec& spec = runner.spec();
+  const std::vector<Delivery> all = deliveries(spec, std::nullopt, false);
+  if (!memory.empty()) {
+    state_t start{};
+    start.utime = all.front().message->header.utime - 250'000;
+    start.run = start.utime;
+    start.process = spec.name;
+    start.layout = spec.state_layout;
+    start.state = memory;
+    start.size_bytes = static_cast<int32_t>(memory.size());
+    const std::vector<uint8_t> bytes = encode(start);
+    REQUIRE(memory_input(spec) >= 0);
+    runner.offer(memory_input(spec), bytes);
+  }
+  for (const Delivery& delivery : all) runner.offer(delivery.input, delivery.message->bytes);
+  return runner.stage().memory();
+}
+
+}  // namespace
+
+TEST_CASE("what a shipped stage remembers comes back through its START input") {
+  for (const std::string& stage : kDemoStages) {
+    CAPTURE(stage);
+    std::vector<uint8_t> memory = remembered(stage, {});
+    REQUIRE(!memory.empty());
+    const std::vector<uint8_t> cold = memory;
+    REQUIRE(remembered(stage, memory) != cold);
+    // Another version's bytes are not taken for numbers.
+    memory.push_back(0);
+    REQUIRE(remembered(stage, memory) == cold);
   }
 }

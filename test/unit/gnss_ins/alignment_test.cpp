@@ -41,6 +41,10 @@ struct Aligned {
   double after_s = 1e9;        ///< from the first sample to the (last) alignment
   double yaw_error_deg = 1e9;  ///< at the end
   int resets = 0;
+  Eigen::Vector3d old_place = Eigen::Vector3d::Zero();   ///< last one of a filter in use
+  Eigen::Vector3d before_new = Eigen::Vector3d::Zero();  ///< that, when it was aligned again
+  Eigen::Vector3d new_place = Eigen::Vector3d::Zero();   ///< and the first one after
+  SE3 delta;                                             ///< as it was announced
 };
 
 Aligned drive_it(const test::Samples& samples, double duration_s) {
@@ -51,6 +55,15 @@ Aligned drive_it(const test::Samples& samples, double duration_s) {
   test::run(filter, samples, [&](GnssIns& f, int64_t now) {
     f.clear_records();
     const double t = seconds_between(start, now);
+    if (const bool done = f.status().phase == AlignmentPhase::kDone; done && !over) {
+      const Eigen::Vector3d place = f.core()->state().position;
+      if (out.after_s > 1e8 && out.old_place.norm() > 0.0) {
+        out.before_new = out.old_place;
+        out.new_place = place;
+        out.delta = f.output().reset_delta;
+      }
+      out.old_place = place;
+    }
     if (over || f.status().phase != AlignmentPhase::kDone) {
       if (!over) out.after_s = 1e9;
       return;
@@ -92,4 +105,7 @@ TEST_CASE("a start that was told the opposite heading heads for the truth") {
   CAPTURE(a.after_s);
   CHECK(a.resets >= 1);
   CHECK(a.yaw_error_deg < 1.0);
+  // The new start is a reset like any other, with the jump of the pose in it (one step of the old filter apart).
+  CHECK((a.new_place - a.before_new).norm() > 2.0);
+  CHECK((a.delta.p - (a.new_place - a.before_new)).norm() < 0.3);
 }

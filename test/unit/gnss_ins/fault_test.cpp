@@ -1,5 +1,6 @@
 // Lies and failures that a filter must survive, by the simulator's faults.
 #include <catch2/catch.hpp>
+#include <cstdio>
 
 #include "filter_run.h"
 
@@ -65,4 +66,64 @@ TEST_CASE("a gyro that clips in turns does not leave a lost filter that calls it
     CHECK(w.last < 0.3);
     CHECK(w.horizontal < 30.0);
   }
+}
+
+TEST_CASE("a receiver that is dragged off at half a metre a second is held against") {
+  const Worst w = drive_with("gnss.ramp@80+40:east_mps=0.5", 150.0, 2);
+  CAPTURE(w.horizontal, w.last, w.resets);
+  CHECK(w.horizontal < 1.5);
+  CHECK(w.last < 0.2);
+  CHECK(w.resets == 0);
+  // What cannot be told: a drag that lasts is believed in the end, with a reset that says so.
+  const Worst followed = drive_with("gnss.ramp@80+100:east_mps=0.5", 180.0, 2);
+  CHECK(followed.resets >= 1);
+  CHECK(followed.horizontal > 10.0);
+}
+
+TEST_CASE("a receiver that claims 3 mm and scatters by centimetres is not locked out") {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const Worst w = drive_with("gnss.claim@30+120:factor=0.1", 150.0, seed);
+    CAPTURE(seed, w.horizontal, w.last);
+    CHECK(w.horizontal < 0.3);
+    CHECK(w.valid_at_end);
+    CHECK(w.resets == 0);
+  }
+}
+
+namespace {
+
+/// Share of the level errors within three of their sigmas, in and after half a minute of multipath.
+double honest_share(bool learns_correlation) {
+  int inside = 0, scored = 0;
+  for (uint64_t seed = 1; seed <= 8; ++seed) {
+    ScenarioConfig s = scenario("city_loop");
+    s.duration_s = 110.0;
+    s.faults.push_back(parse_fault("gnss.multipath@60+30:sigma_m=4,correlation_s=6,claim=0.5"));
+    const SimulatedDrive drive = simulate(s, seed);
+    s.faults.clear();
+    GnssInsConfig config = test::filter_config(s);
+    config.aiding.use_error_correlation = learns_correlation;
+    GnssIns filter(config);
+    int64_t next = drive.imu.front().t_us + 60'000'000;
+    test::run(filter, test::Samples(drive), [&](GnssIns& f, int64_t now) {
+      f.clear_records();
+      if (now < next) return;
+      next += 500'000;
+      const Odometry o = f.output().odometry;
+      const auto e = test::error_of(f, o, drive);
+      for (int i = 0; i < 2; ++i) inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
+      scored += 2;
+    });
+  }
+  return static_cast<double>(inside) / scored;
+}
+
+}  // namespace
+
+TEST_CASE("errors that stay alike under a bridge are not averaged away") {
+  const double share = honest_share(true), naive = honest_share(false);
+  CAPTURE(share, naive);
+  std::printf("within three sigma in multipath: %.3f, taken for independent: %.3f\n", share, naive);
+  CHECK(share > 0.97);
+  CHECK(naive < share - 0.05);
 }

@@ -38,23 +38,39 @@ struct Samples {
   explicit Samples(const SimulatedDrive& drive) : imu(drive.imu), gnss(drive.gnss), wheels(drive.wheels) {}
 };
 
+/// Hands samples in one IMU sample at a time; a copy goes on where the original stood.
+class Feeder {
+ public:
+  explicit Feeder(const Samples& samples) : samples_(&samples) {}
+
+  /// False at the end.
+  bool step(GnssIns& filter) {
+    constexpr int64_t kLateness = 250'000;
+    const Samples& s = *samples_;
+    if (newest_ == s.imu.size()) return false;
+    const ImuSample& newest = s.imu[newest_++];
+    (void)filter.see(newest);
+    for (; at_horizon_ < s.imu.size() && s.imu[at_horizon_].t_us <= newest.t_us - kLateness; ++at_horizon_) {
+      const int64_t t_us = s.imu[at_horizon_].t_us;
+      for (; fix_ < s.gnss.size() && s.gnss[fix_].t_us <= t_us; ++fix_)
+        filter.add(s.gnss[fix_], static_cast<int64_t>(fix_));
+      for (; wheel_ < s.wheels.size() && s.wheels[wheel_].t_us <= t_us; ++wheel_) filter.add(s.wheels[wheel_]);
+      (void)filter.advance(s.imu[at_horizon_]);
+    }
+    now_ = newest.t_us;
+    return true;
+  }
+  [[nodiscard]] int64_t now() const { return now_; }
+
+ private:
+  const Samples* samples_;
+  size_t newest_ = 0, at_horizon_ = 0, fix_ = 0, wheel_ = 0;
+  int64_t now_ = 0;
+};
+
 /// Calls seen(filter, now) after every IMU sample.
 inline void run(GnssIns& filter, const Samples& samples, const std::function<void(GnssIns&, int64_t)>& seen) {
-  constexpr int64_t kLateness = 250'000;
-  size_t at_horizon = 0, fix = 0, wheel = 0;
-  for (const ImuSample& newest : samples.imu) {
-    (void)filter.see(newest);
-    while (at_horizon < samples.imu.size() && samples.imu[at_horizon].t_us <= newest.t_us - kLateness) {
-      const int64_t t_us = samples.imu[at_horizon].t_us;
-      while (fix < samples.gnss.size() && samples.gnss[fix].t_us <= t_us) {
-        filter.add(samples.gnss[fix], static_cast<int64_t>(fix));
-        ++fix;
-      }
-      while (wheel < samples.wheels.size() && samples.wheels[wheel].t_us <= t_us) filter.add(samples.wheels[wheel++]);
-      (void)filter.advance(samples.imu[at_horizon++]);
-    }
-    seen(filter, newest.t_us);
-  }
+  for (Feeder feeder(samples); feeder.step(filter);) seen(filter, feeder.now());
 }
 
 /// Error of an output against the drive's truth: position in enu, rotation in imu axes, velocity in imu axes.

@@ -89,22 +89,36 @@ TEST_CASE("a gated fix leaves the same bits as no fix") {
 }
 
 TEST_CASE("a snapshot continues to the same bits") {
-  const test::Samples samples(drive());
-  GnssIns whole(test::filter_config(drive().config)), resumed(test::filter_config(drive().config));
-  std::vector<uint8_t> snapshot;
-  GnssInsOutput expected;
-  const int64_t at = samples.imu[samples.imu.size() / 2].t_us;
-  test::Samples first = samples;
-  GnssIns* target = &whole;
-  test::run(whole, samples, [&](GnssIns& f, int64_t now) {
-    if (now == at) snapshot = f.save();
-    expected = f.output();
-  });
-  resumed.load(snapshot);
-  CHECK(resumed.save() == snapshot);
-  CHECK_THROWS(resumed.load(std::span(snapshot).first(snapshot.size() / 2)));
-  (void)first;
-  (void)target;
+  test::Samples samples(drive());
+  move(samples.gnss[fix_at(samples, 52.0)], {20.0, 0.0, 0.0});  // so that a refusal is among what goes on
+  for (const double share : {0.05, 0.12, 0.5}) {                // before, while and after it aligns
+    CAPTURE(share);
+    GnssIns whole(test::filter_config(drive().config)), resumed(test::filter_config(drive().config));
+    test::Feeder feeder(samples);
+    for (auto left = static_cast<size_t>(share * static_cast<double>(samples.imu.size())); left > 0; --left) {
+      feeder.step(whole);
+      (void)whole.output();
+    }
+    const std::vector<uint8_t> snapshot = whole.save();
+    resumed.load(snapshot);
+    CHECK(resumed.save() == snapshot);
+    CHECK_THROWS(GnssIns(test::filter_config(drive().config)).load(std::span(snapshot).first(snapshot.size() / 2)));
+    whole.clear_records();
+    bool same = true, same_records = true;
+    for (test::Feeder other = feeder; feeder.step(whole) && other.step(resumed);) {
+      const GnssInsOutput a = whole.output(), b = resumed.output();
+      same = same && a.odometry.T_frame_vehicle.p == b.odometry.T_frame_vehicle.p &&
+             a.odometry.T_frame_vehicle.q.coeffs() == b.odometry.T_frame_vehicle.q.coeffs() &&
+             a.odometry.cov_pose == b.odometry.cov_pose && a.odometry.velocity == b.odometry.velocity &&
+             a.reason == b.reason && a.odometry.validity == b.odometry.validity;
+      same_records = same_records && whole.records().size() == resumed.records().size();
+      whole.clear_records();
+      resumed.clear_records();
+    }
+    CHECK(same);
+    CHECK(same_records);
+    CHECK(whole.save() == resumed.save());
+  }
 }
 
 TEST_CASE("shifted stamps give the same estimate") {
@@ -168,7 +182,39 @@ TEST_CASE("a height above mean sea level, 40 m off, costs the height and not the
   CHECK(f.error.head<2>().norm() < 0.2);
 }
 
-TEST_CASE("infinite variance has no effect") {
+TEST_CASE("a fix of a kilometre's sigma has no effect") {
+  test::Samples s(drive()), without(drive());
+  const size_t i = fix_at(s, 50.0);
+  without.gnss.erase(without.gnss.begin() + static_cast<ptrdiff_t>(i));
+  const auto end_of = [&](const test::Samples& samples) {
+    GnssInsConfig config = test::filter_config(drive().config);
+    config.screen.max_sigma_m = 1e7;  // it must come through to the update
+    GnssIns filter(config);
+    int used = 0;
+    NavState soon;  // half a second after that fix
+    test::run(filter, samples, [&](GnssIns& f, int64_t now) {
+      if (seconds_between(s.gnss[i].t_us, now) < 0.75) soon = f.core() == nullptr ? NavState() : f.core()->state();
+      for (const AidingRecord& r : f.records())
+        used +=
+            r.t_us == s.gnss[i].t_us && r.source == AidingSource::kGnssPosition && r.status == AidingStatus::kAccepted;
+      f.clear_records();
+    });
+    return std::pair(soon, used);
+  };
+  const auto [reference, none] = end_of(without);
+  CHECK(none == 0);
+  s.gnss[i].velocity.reset();
+  s.gnss[i].cov_enu = 1e6 * Eigen::Matrix3d::Identity();
+  const auto [state, used] = end_of(s);
+  CHECK(used == 1);
+  // Not the same bits: the covariance step is split where it is used.
+  CHECK(local(reference, state).norm() < 1e-6);
+  // Teeth: with a sigma of five centimetres it has one.
+  s.gnss[i].cov_enu = 2.5e-3 * Eigen::Matrix3d::Identity();
+  CHECK(local(reference, end_of(s).first).norm() > 1e-5);
+}
+
+TEST_CASE("a covariance that is not finite is refused and leaves the same bits as no fix") {
   test::Samples s(drive()), without(drive());
   const size_t i = fix_at(s, 50.0);
   s.gnss[i].cov_enu.setConstant(std::numeric_limits<double>::infinity());

@@ -1,0 +1,127 @@
+// Positions and the rest that waited, once the state has reached them; who is believed when filter and receiver differ.
+#include <algorithm>
+#include <cmath>
+
+#include "gnss_ins/gnss_ins.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr double kMoving = 1.0;          // m/s
+constexpr double kRecoveryHolds = 60.0;  // s; refused again within, the attitude is wrong as well
+constexpr double kConfirmed = 1.0;       // s since another source last agreed with the filter's velocity
+constexpr double kOutage = 3.0;          // s without a position, after which a receiver may come back displaced
+// Correlation time of the errors of fixes without a fixed carrier phase, until they have shown theirs: multipath and
+// code smoothing last seconds to a minute (Misra and Enge, Global Positioning System, 2006, ch. 5).
+constexpr double kCodeAlike = 5.0;  // s
+
+}  // namespace
+
+void GnssIns::use(const Pending& measured) {
+  Pending p = measured;
+  if (p.kind == PendingKind::kPosition) {
+    use_position(p);
+  } else if (p.kind == PendingKind::kVelocity) {
+    p.cov *= velocity_noise_.variance_factor();
+    const AidingRecord r = applier_.apply(*core_, p, gates_);
+    velocity_noise_.learn(r);
+    note(r, p.id);
+  } else if (p.kind == PendingKind::kMag && core_->heading_std() < config_.aiding.mag_std) {
+    // Its errors do not average out: once the heading is better than the magnetometer, it only harms.
+    AidingRecord r;
+    r.t_us = p.t_us;
+    r.source = AidingSource::kMagHeading;
+    r.status = AidingStatus::kDisabled;
+    note(r, p.id);
+  } else {
+    note(applier_.apply(*core_, p, gates_), p.id);
+  }
+}
+
+bool GnssIns::velocity_confirmed(int64_t t_us) const {
+  for (const AidingSource source : {AidingSource::kGnssVelocity, AidingSource::kWheelSpeed}) {
+    const int64_t at = used_at_us_[static_cast<size_t>(source)];
+    if (at != 0 && seconds_between(at, t_us) < kConfirmed) return true;
+  }
+  return false;
+}
+
+void GnssIns::use_position(const Pending& measured) {
+  Pending p = measured;
+  PositionQuality& quality = position_quality_[static_cast<size_t>(p.fix_type)];
+  const double since = position_at_us_ == 0 ? 2.0 * kOutage : seconds_between(position_at_us_, p.t_us);
+  if (since > kOutage) {
+    const double alike = std::exp(-fix_interval_ / kCodeAlike);
+    for (size_t type = 0; type < position_quality_.size(); ++type)
+      position_quality_[type].correlation.assume(type == static_cast<size_t>(FixType::kRtkFixed) ? 0.0 : alike);
+  } else if (since > 0.0) {
+    fix_interval_ = since;
+  }
+  position_at_us_ = p.t_us;
+  p.cov *= quality.noise.variance_factor();
+  if (config_.aiding.use_error_correlation) p.alike = quality.correlation.inflation();
+
+  AidingRecord r = applier_.apply(*core_, p, gates_);
+  // A jump, or a receiver that is dragged away from what wheels or its own velocity say, tells nothing of the noise.
+  const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
+  const bool dragged = jump_.one_sided() && velocity_confirmed(p.t_us);
+  if (!jumped && !dragged) quality.noise.learn(r);
+  if (r.status == AidingStatus::kGated) {
+    const AidingRecord level = applier_.apply_level(*core_, p, gates_);
+    if (level.status == AidingStatus::kAccepted) r = level;
+  }
+  quality.correlation.learn(r, p.cov.diagonal(), p.alike);
+  if (r.status == AidingStatus::kAccepted) {
+    if (agreed_since_us_ == 0) agreed_since_us_ = p.t_us;
+    refused_ = 0;
+    unseen_ = false;
+  } else {
+    if (refused_++ == 0) refused_since_us_ = p.t_us;
+    const AlignmentConfig& a = config_.alignment;
+    // The receiver that jumped or is dragged is held against the filter as long as they agreed before.
+    const double agreed = agreed_since_us_ == 0 ? 0.0 : seconds_between(agreed_since_us_, refused_since_us_);
+    const double patience =
+        jumped || dragged ? std::clamp(agreed, a.recovery_s, std::max(a.recovery_s, a.jump_s)) : a.recovery_s;
+    if (refused_ >= a.recovery_fixes && seconds_between(refused_since_us_, p.t_us) >= patience) {
+      // Position and velocity were taken from the fixes and do not hold: the heading must be wrong.
+      lost_ = !dragged && recovered_at_us_ != 0 && seconds_between(recovered_at_us_, p.t_us) < kRecoveryHolds;
+      recovered_at_us_ = p.t_us;
+      agreed_since_us_ = 0;
+      if (!lost_) recover(p);
+      r.status = AidingStatus::kReset;
+    }
+  }
+  note(r, p.id);
+}
+
+void GnssIns::recover(const Pending& p) {
+  const NavState before = core_->state();
+  ErrorMatrix P = core_->covariance();
+  // The filter's position and velocity are given up; attitude and biases are kept, with room to be wrong.
+  P.middleRows<6>(kPos).setZero();
+  P.middleCols<6>(kPos).setZero();
+  P.diagonal().segment<3>(kPos).setConstant(1e4);
+  P.diagonal().segment<3>(kVel).setConstant(4.0);
+  P.diagonal().segment<3>(kAtt) += Eigen::Vector3d(1e-4, 1e-4, 3e-3);
+  core_->initialise(before, P);
+  (void)applier_.apply(*core_, p, no_gates_);
+  const NavState& after = core_->state();
+  ++reset_counter_;
+  reset_delta_.p = after.position - before.position;
+  reset_delta_.q = before.q_enu_imu.conjugate() * after.q_enu_imu;
+  refused_ = 0;
+  jump_ = JumpJudge();
+}
+
+bool GnssIns::moved_meanwhile(double dt) const {
+  if (core() == nullptr) return false;
+  const NavState& before = core()->state();
+  if (before.velocity.norm() > kMoving) return true;
+  if (!fix_ || fix_->t_us <= before.t_us) return false;
+  const Eigen::Vector3d way =
+      enu_->enu(fix_->antenna) - before.position - before.q_enu_imu * config_.vehicle.p_imu_antenna;
+  return way.head<2>().norm() > kMoving * dt + 3.0 * std::sqrt(fix_->cov_enu(0, 0) + fix_->cov_enu(1, 1));
+}
+
+}  // namespace roadfix
