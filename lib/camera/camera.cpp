@@ -60,8 +60,8 @@ Distorted distort_normalised(const CameraIntrinsics& k, const Eigen::Vector2d& n
 double fold_radius(CameraIntrinsics k) {
   if (k.distortion == Distortion::kNone) return kMaxRadius;
   if (k.distortion == Distortion::kRadTan) k.coefficients[2] = k.coefficients[3] = 0.0;
-  for (double r = kRadiusStep; r < kMaxRadius; r += kRadiusStep) {
-    if (distort_normalised(k, {r, 0.0}).J(0, 0) <= 0.0) return r - kRadiusStep;
+  for (int i = 1; i * kRadiusStep < kMaxRadius; ++i) {
+    if (distort_normalised(k, {i * kRadiusStep, 0.0}).J(0, 0) <= 0.0) return (i - 1) * kRadiusStep;
   }
   return kMaxRadius;
 }
@@ -82,7 +82,7 @@ std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& p_camera, 
   if (!(p_camera.z() > kMinDepth)) return std::nullopt;
   const Eigen::Vector2d n = p_camera.head<2>() / p_camera.z();
   Eigen::Matrix2d J;
-  const auto pixel = distort(n, J_point != nullptr ? &J : nullptr);
+  auto pixel = distort(n, J_point != nullptr ? &J : nullptr);
   if (pixel && J_point != nullptr) {
     Matrix23d J_perspective;
     J_perspective << 1.0, 0.0, -n.x(), 0.0, 1.0, -n.y();
