@@ -136,6 +136,28 @@ void add_house(WorldBuilder& b, const Station& at, const House& h, PlaceRandom& 
   add_relief(b, at, T * SE3{Eigen::Quaterniond::Identity(), {0.0, -h.half_depth, 0.0}}, size.x(), height, random);
 }
 
+/// What stands behind the first row, so that gaps in it do not look out to sea: every kBackRow_m on either side.
+void build_back_rows(WorldBuilder& b, std::vector<House>& houses) {
+  constexpr int kBackRow_m = 22;
+  for (int i = 0; i < b.line.size(); i += kBackRow_m) {
+    const Station& at = b.line[i];
+    const bool town = at.kind == StreetKind::kStreet || at.kind == StreetKind::kBridge;
+    if (!town || at.again) continue;
+    for (const double side : {-1.0, 1.0}) {
+      PlaceRandom random = b.random(at.p, side < 0.0 ? "behind right" : "behind left");
+      House h;
+      h.along = side * -1.0 * at.forward.head<2>();
+      h.across = side * at.left.head<2>();
+      h.half_width = 0.5 * random.uniform(12.0, 20.0);
+      h.half_depth = 0.5 * random.uniform(9.0, 13.0);
+      h.middle = at.p.head<2>() + side * random.uniform(34.0, 52.0) * at.left.head<2>();
+      if (at.inside < h.half_width + 4.0 || !stands_free(h, at.p.z(), b, houses)) continue;
+      houses.push_back(h);
+      add_house(b, at, h, random);
+    }
+  }
+}
+
 }  // namespace
 
 void build_houses(WorldBuilder& b) {
@@ -166,6 +188,7 @@ void build_houses(WorldBuilder& b) {
       }
     }
   }
+  build_back_rows(b, houses);
 }
 
 }  // namespace roadfix

@@ -119,6 +119,10 @@ std::vector<Face> car_faces(std::uint32_t key) {
                   {0.0, kFloor});
     car_rectangle(faces, at(0.7, side * kHalf, kWaist), {2.5, 0, 0}, {0, side * (kCabin - kHalf), kRoof - kWaist},
                   Pattern::kCarSide, {0.7, kWaist});
+    for (const double wheel : {0.8, 3.4}) {  // what stands out below the body
+      car_rectangle(faces, at(wheel - 0.22, side * kHalf, 0.0), {0.44, 0, 0}, {0, 0, kFloor}, Pattern::kCarSide,
+                    {wheel - 0.22, 0.0});
+    }
   }
   for (const double s : {0.0, kLength}) {
     car_rectangle(faces, at(s, -kHalf, kFloor), {0, 2 * kHalf, 0}, {0, 0, kWaist - kFloor}, Pattern::kCarEnd,
@@ -190,6 +194,7 @@ void build_car_parks(WorldBuilder& b) {
     for (double x = lo.x() + 10.0; x < hi.x(); x += 24.0) {
       if (b.line.passes(place(x, y + 5.2, 0), 2.0)) continue;
       b.box(at, {beside(at, 0).q, place(x, y + 5.2, 0)}, {0.2, 0.2, 6.0}, kPost, kPost);
+      b.box(at, {beside(at, 0).q, place(x, y + 5.2, 6.0)}, {0.4, 1.6, 0.15}, kPost, kPost);
     }
   }
   const Look hall{Material::kBrick, Pattern::kWindows, 1.0F, 3.2F, 3.5F};

@@ -20,22 +20,31 @@ Cell cell_of(const SurfaceLanes& p) {
 /// A worn line: white where it is not rubbed off.
 F8 line(F8 below, F8 covered, F8 speckle) { return mix(below, 0.62F + 2.0F * speckle, covered); }
 
-F8 lanes(const SurfaceLanes& p, F8 below, F8 speckle, bool motorway) {
+/// Metres to the left of the driven line: what lies to its right is in the block before, near that one's end.
+F8 left_of_line(const SurfaceLanes& p) {
+  constexpr auto kBlock = static_cast<float>(kTextureBlock_m);
+  return select(p.t > 0.5F * kBlock, p.t - kBlock, p.t);
+}
+
+F8 lanes(const SurfaceLanes& p, F8 below, F8 speckle, Pattern pattern) {
+  const bool motorway = pattern == Pattern::kThreeLanes;
+  const F8 t = left_of_line(p);
   const F8 dash =
       periodic_coverage(p.s, p.width_s, splat(motorway ? 16.0F : 8.0F), splat(1.0F), splat(motorway ? 7.0F : 4.0F));
-  F8 x = line(below, band(p.t, p.width_t, -1.80F, -1.65F), speckle);
-  x = line(x, band(p.t, p.width_t, 1.69F, 1.81F) * dash, speckle);
-  x = line(x, band(p.t, p.width_t, 5.15F, 5.30F) * (motorway ? dash : splat(1.0F)), speckle);
-  if (motorway) return line(x, band(p.t, p.width_t, 8.65F, 8.80F), speckle);
+  F8 x = line(below, band(t, p.width_t, -1.80F, -1.65F), speckle);
+  x = line(x, band(t, p.width_t, 1.69F, 1.81F) * dash, speckle);
+  x = line(x, band(t, p.width_t, 5.15F, 5.30F) * (motorway ? dash : splat(1.0F)), speckle);
+  if (motorway) return line(x, band(t, p.width_t, 8.65F, 8.80F), speckle);
+  if (pattern == Pattern::kBareLanes) return x;
   // In one block of 64 m out of two a zebra crossing; arrows in front of it.
-  const U8 h = hash_cell(p.block_s, p.block_t, p.key);
-  const F8 begin = 8.0F + 40.0F * fraction(h, 0);
-  const F8 stripes = periodic_coverage(p.t + 64.0F, p.width_t, splat(1.0F), splat(0.25F), splat(0.75F));
-  const F8 road = band(p.t, p.width_t, -1.5F, 5.0F);
+  const U8 h = hash_cell(p.block_s, I8{}, p.key);
+  const F8 begin = 12.0F + 40.0F * fraction(h, 0);
+  const F8 stripes = periodic_coverage(t + 64.0F, p.width_t, splat(1.0F), splat(0.25F), splat(0.75F));
+  const F8 road = band(t, p.width_t, -1.5F, 5.0F);
   const F8 zebra = coverage(p.s, p.width_s, begin, begin + 3.5F) * stripes * road;
-  const F8 stop = coverage(p.s, p.width_s, begin - 2.0F, begin - 1.6F) * band(p.t, p.width_t, -1.65F, 1.69F);
-  const F8 shaft = coverage(p.s, p.width_s, begin - 9.0F, begin - 5.5F) * band(p.t, p.width_t, -0.09F, 0.09F);
-  const F8 head = coverage(p.s, p.width_s, begin - 6.1F, begin - 5.5F) * band(p.t, p.width_t, -0.35F, 0.35F);
+  const F8 stop = coverage(p.s, p.width_s, begin - 2.0F, begin - 1.6F) * band(t, p.width_t, -1.65F, 1.69F);
+  const F8 shaft = coverage(p.s, p.width_s, begin - 9.0F, begin - 5.5F) * band(t, p.width_t, -0.09F, 0.09F);
+  const F8 head = coverage(p.s, p.width_s, begin - 6.1F, begin - 5.5F) * band(t, p.width_t, -0.35F, 0.35F);
   return select(fraction(h, 16) < 0.5F, line(x, clamp01(zebra + stop + max(shaft, head)), speckle), x);
 }
 
@@ -71,12 +80,18 @@ F8 courses(const SurfaceLanes& p, F8 below, F8 speckle) {
   return mix(stone, below * 0.5F, covered);
 }
 
+/// Share of the footprint within `radius` of (s, t), to a tenth or so: its edge is a ramp as wide as the footprint.
+F8 disc(const SurfaceLanes& p, float s, float t, float radius) {
+  const F8 ds = p.s - s;
+  const F8 dt = p.t - t;
+  const F8 width = max(max(p.width_s, p.width_t), splat(1e-3F));
+  return clamp01((radius - root(ds * ds + dt * dt)) / width + 0.5F);
+}
+
 /// Length 4.3 m: wheels at 0.8 and 3.4, dark windows from 0.85 m up.
 F8 car_side(const SurfaceLanes& p, F8 below) {
-  const F8 wheels =
-      (band(p.s, p.width_s, 0.50F, 1.10F) + band(p.s, p.width_s, 3.10F, 3.70F)) * band(p.t, p.width_t, 0.0F, 0.62F);
-  const F8 hubs =
-      (band(p.s, p.width_s, 0.65F, 0.95F) + band(p.s, p.width_s, 3.25F, 3.55F)) * band(p.t, p.width_t, 0.17F, 0.47F);
+  const F8 wheels = disc(p, 0.8F, 0.31F, 0.34F) + disc(p, 3.4F, 0.31F, 0.34F);
+  const F8 hubs = disc(p, 0.8F, 0.31F, 0.17F) + disc(p, 3.4F, 0.31F, 0.17F);
   const F8 glass =
       (band(p.s, p.width_s, 1.05F, 1.95F) + band(p.s, p.width_s, 2.05F, 2.90F)) * band(p.t, p.width_t, 0.92F, 1.36F);
   const F8 handles =
@@ -139,9 +154,9 @@ F8 paint_one(Pattern pattern, const SurfaceLanes& p, F8 base, F8 speckle) {
     case Pattern::kNone:
       return base + speckle;
     case Pattern::kTwoLanes:
-      return lanes(p, base + speckle, speckle, false);
+    case Pattern::kBareLanes:
     case Pattern::kThreeLanes:
-      return lanes(p, base + speckle, speckle, true);
+      return lanes(p, base + speckle, speckle, pattern);
     case Pattern::kWindows:
       return windows(p, base, speckle);
     case Pattern::kCourses:

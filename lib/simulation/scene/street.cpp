@@ -4,6 +4,7 @@
 
 #include "geometry/frames.h"
 #include "simulation/scene/builder.h"
+#include "simulation/scene/texture.h"
 
 namespace roadfix {
 namespace {
@@ -13,6 +14,7 @@ constexpr double kCorridorLight = 0.06;  // office lighting over daylight is les
 constexpr double kLampIntensity = 0.80;  // gives about 0.05 on a lit tunnel's road: 1/25 of daylight
 constexpr double kTunnelFall_m = 6.0;    // daylight falls to a third this far inside
 constexpr double kBend = 0.04;           // rad within one quad of a ribbon
+constexpr double kStraight = 0.004;      // 1/m: no crossing is painted in tighter bends
 
 std::uint64_t mix64(std::uint64_t z) {  // the finaliser of SplitMix64 (Steele, Lea, Flood 2014, figure 16)
   z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
@@ -136,13 +138,38 @@ SE3 beside(const Station& at, double t, double z) {
           at.p + t * at.left + Eigen::Vector3d(0.0, 0.0, z)};
 }
 
+namespace {
+
+/// The stations where a crossing may be painted: those of straight, open pieces of road, each one texture block long.
+std::vector<bool> crossing_allowed(const StreetLine& line) {
+  const auto block = [](const Station& s) { return static_cast<int>(std::floor(s.s / kTextureBlock_m)); };
+  const int first = block(line[0]);
+  std::vector<bool> straight(static_cast<std::size_t>(block(line[line.size() - 1]) - first + 1), true);
+  for (const Station& s : line.stations()) {
+    if (s.kind != StreetKind::kStreet || s.again || std::abs(s.curvature) > kStraight)
+      straight[static_cast<std::size_t>(block(s) - first)] = false;
+  }
+  std::vector<bool> allowed;
+  for (const Station& s : line.stations()) allowed.push_back(straight[static_cast<std::size_t>(block(s) - first)]);
+  return allowed;
+}
+
+}  // namespace
+
 void build_roads(WorldBuilder& b) {
   const auto kind_is = [](auto... kinds) { return [=](const Station& s) { return ((s.kind == kinds) || ...); }; };
-  const Look road{Material::kAsphalt, Pattern::kTwoLanes};
+  const auto crossings = crossing_allowed(b.line);
   const Look pavement{Material::kPavement, Pattern::kCourses, 1.0F, 0.5F, 0.5F};
   const Look kerb{Material::kPavement, Pattern::kCourses, 1.1F, 1.0F, 4.0F};
   for_stretches(b.line, kind_is(StreetKind::kStreet, StreetKind::kBridge), [&](int i, int j) {
-    b.ribbon(i, j, 8, {-4.3, 0.0}, {7.8, 0.0}, road);
+    for (int k = i; k < j;) {
+      int end = k + 1;
+      const bool crossing = crossings[static_cast<std::size_t>(k)];
+      while (end < j && crossings[static_cast<std::size_t>(end)] == crossing) ++end;
+      const Look road{Material::kAsphalt, crossing ? Pattern::kTwoLanes : Pattern::kBareLanes};
+      b.ribbon(k, end, 8, {-4.3, 0.0}, {7.8, 0.0}, road);
+      k = end;
+    }
     b.ribbon(i, j, 8, {-4.3, 0.0}, {-4.3, 0.14}, kerb);
     b.ribbon(i, j, 8, {7.8, 0.0}, {7.8, 0.14}, kerb);
     b.ribbon(i, j, 8, {-7.6, 0.14}, {-4.3, 0.14}, pavement);

@@ -31,9 +31,15 @@ class StreetLine {
   [[nodiscard]] int size() const { return static_cast<int>(stations_.size()); }
   [[nodiscard]] const Station& operator[](int i) const { return stations_[static_cast<std::size_t>(i)]; }
   /// Whether some station lies within `radius` of p, level distance.
-  [[nodiscard]] bool passes(const Eigen::Vector3d& p, double radius) const;
+  [[nodiscard]] bool passes(const Eigen::Vector3d& p, double radius) const { return passes(p, radius, -1, 0); }
+  /// The same without the stations next to this one and without further laps.
+  [[nodiscard]] bool passes_elsewhere(const Eigen::Vector3d& p, double radius, int station) const {
+    return passes(p, radius, station, kNextTo);
+  }
 
  private:
+  static constexpr int kNextTo = 8;
+  [[nodiscard]] bool passes(const Eigen::Vector3d& p, double radius, int except, int reach) const;
   void find_repeats();
   std::vector<Station> stations_;
   std::map<std::pair<int, int>, std::vector<int>> grid_;  ///< stations by cell

@@ -15,12 +15,12 @@ constexpr double kBorder_px = 4.0;
 constexpr int kDrawsPerMissing = 80;  // tries for each track that is missing; most points are hidden or near another
 
 /// Points a tracker would find, per m2 of surface.
-double density(Material m) {
-  switch (m) {
+double density(const Face& f) {
+  switch (f.material) {
     case Material::kGround:
       return 0.1;
     case Material::kBlankWall:
-      return 0.02;
+      return f.pattern == Pattern::kCourses ? 0.2 : 0.02;  // tiles have corners
     case Material::kLamp:
       return 0.0;
     default:
@@ -84,7 +84,7 @@ struct TrackSimulator::Impl {
 
   void scatter(const Face& f, int mover, RandomStream& places) {
     const double area = 0.5 * ((f.corner[2] - f.corner[0]).cross(f.corner[3] - f.corner[1])).norm();
-    const double expected = density(f.material) * area * (mover < 0 ? 1.0 : 4.0);
+    const double expected = density(f) * area * (mover < 0 ? 1.0 : 4.0);
     const int count = static_cast<int>(expected + places.uniform());
     for (int k = 0; k < count; ++k) {
       const double u = places.uniform();

@@ -6,6 +6,8 @@ namespace {
 constexpr double kRight = -3.4;  // walls of the tunnel, to the left of the driven line
 constexpr double kLeft = 6.9;
 constexpr double kHalfCorridor = 1.5;
+constexpr double kFloorEdge = 2.4;  // its floor goes on behind the walls, so that junctions have no gaps
+constexpr double kDoorway = 0.95;   // half the width of a way through a wall
 constexpr double kCorridorHeight = 2.8;
 constexpr double kDeck = 6.0;  // underside of the bridge
 
@@ -13,7 +15,7 @@ void build_tunnel(WorldBuilder& b, int i, int j) {
   const Look wall{Material::kTunnelWall, Pattern::kCourses, 1.0F, 2.0F, 1.25F};
   const Look ceiling{Material::kConcrete, Pattern::kCourses, 0.8F, 4.0F, 2.0F};
   constexpr int kStep = 2;  // fine enough for the pools of light
-  b.ribbon(i, j, kStep, {kRight, 0.0}, {kLeft, 0.0}, {Material::kAsphalt, Pattern::kTwoLanes});
+  b.ribbon(i, j, kStep, {kRight, 0.0}, {kLeft, 0.0}, {Material::kAsphalt, Pattern::kBareLanes});
   for (const double t : {kRight, kLeft}) {
     const double inner = t < 0.0 ? t + 0.9 : t - 0.9;
     b.ribbon(i, j, kStep, {t, 0.2}, {inner, 0.2}, {Material::kPavement, Pattern::kCourses, 1.0F, 1.0F, 0.5F});
@@ -91,13 +93,40 @@ void build_bridge(WorldBuilder& b, int i, int j) {
   }
 }
 
-void build_corridor(WorldBuilder& b, int i, int j) {
+/// One wall of a corridor, open where the way comes through from another one.
+void build_corridor_wall(WorldBuilder& b, int i, int j, double t) {
   const Look wall{Material::kBlankWall};
-  b.ribbon(i, j, 4, {-kHalfCorridor, 0.0}, {kHalfCorridor, 0.0},
+  const auto open_at = [&](int k) { return b.line.passes_elsewhere(b.line[k].at(t, 0.0), kDoorway, k); };
+  for (int k = i; k < j;) {
+    int end = k;
+    while (end < j && !open_at(end) && !open_at(end + 1)) ++end;
+    if (end > k) b.ribbon(k, end, 4, {t, 0.0}, {t, kCorridorHeight}, wall);
+    k = end;
+    if (k == j) break;
+    constexpr int kParts = 8;
+    const Eigen::Vector3d begin = b.line[k].at(t, 0.0);
+    const Eigen::Vector3d part = (b.line[k + 1].at(t, 0.0) - begin) / kParts;
+    for (int n = 0; n < kParts; ++n) {
+      const Eigen::Vector3d corner = begin + n * part;
+      if (b.line.passes_elsewhere(corner + 0.5 * part, kDoorway, k)) continue;
+      b.rectangle(b.line[k], corner, part, Eigen::Vector3d(0, 0, kCorridorHeight), wall);
+    }
+    ++k;
+  }
+}
+
+/// `depth`: this stretch's floor and ceiling lie so much outside of those of the stretches before, which they may meet.
+void build_corridor(WorldBuilder& b, int i, int j, double depth) {
+  b.ribbon(i, j, 4, {-kFloorEdge, -depth}, {kFloorEdge, -depth},
            {Material::kBlankWall, Pattern::kCourses, 0.6F, 1.0F, 1.0F});
-  b.ribbon(i, j, 4, {-kHalfCorridor, kCorridorHeight}, {kHalfCorridor, kCorridorHeight},
+  b.ribbon(i, j, 4, {-kFloorEdge, kCorridorHeight + depth}, {kFloorEdge, kCorridorHeight + depth},
            {Material::kBlankWall, Pattern::kNone, 1.2F});
-  for (const double t : {-kHalfCorridor, kHalfCorridor}) b.ribbon(i, j, 4, {t, 0.0}, {t, kCorridorHeight}, wall);
+  for (const double t : {-kHalfCorridor, kHalfCorridor}) build_corridor_wall(b, i, j, t);
+  for (const int end : {i, j}) {
+    if ((end != 0 && end != b.line.size() - 1) || b.line[end].again) continue;
+    b.rectangle(b.line[end], b.line[end].at(-kHalfCorridor, 0.0), 2.0 * kHalfCorridor * b.line[end].left,
+                Eigen::Vector3d(0, 0, kCorridorHeight), {Material::kBlankWall});
+  }
   for (int k = i; k < j; k += 9) {
     const Station& at = b.line[k];
     PlaceRandom random = b.random(at.p, "corridor");
@@ -111,6 +140,7 @@ void build_corridor(WorldBuilder& b, int i, int j) {
 }  // namespace
 
 void build_tunnels(WorldBuilder& b) {
+  double depth = 0.0;  // m
   for (const StreetKind kind :
        {StreetKind::kTunnelLit, StreetKind::kTunnelDark, StreetKind::kBridge, StreetKind::kCorridor}) {
     for_stretches(
@@ -119,7 +149,8 @@ void build_tunnels(WorldBuilder& b) {
           if (kind == StreetKind::kBridge) {
             build_bridge(b, i, j);
           } else if (kind == StreetKind::kCorridor) {
-            build_corridor(b, i, j);
+            build_corridor(b, i, j, depth);
+            depth += 0.004;
           } else {
             build_tunnel(b, i, j);
             for (const int end : {i, j}) build_portal(b, end);

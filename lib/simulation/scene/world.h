@@ -30,7 +30,8 @@ enum class Material : std::uint8_t {
 /// What is painted on a face besides its material's grain. Coordinates s, t in m along the face's edges.
 enum class Pattern : std::uint8_t {
   kNone,
-  kTwoLanes,    // s along the road, t to the left of the driven lane's centre
+  kTwoLanes,    // s along the road, t to the left of the driven lane's centre; here and there a zebra crossing
+  kBareLanes,   // the same without crossings
   kThreeLanes,  // the same, three lanes
   kWindows,     // pattern_s by pattern_t: one window each
   kCourses,     // joints every pattern_s by pattern_t

@@ -1,12 +1,15 @@
 // The street is one: laps find it again, places differ, tunnels have no holes, corners are there to be found.
 #include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <set>
 
+#include "simulation/scenarios.h"
+#include "simulation/scene/drive_scene.h"
 #include "simulation/scene/sensor.h"
 #include "unit/scene/streets.h"
 
@@ -83,6 +86,98 @@ TEST_CASE("no two places of a straight street look alike") {
   CHECK(largest < 0.6);
   const cv::Mat again = grey(world, camera, test::view_at(plan, 40), 5e-4);
   CHECK(correlation(again, pictures[0]) > 0.99);
+}
+
+TEST_CASE("a lane is marked on both sides, and no crossing lies in a tunnel or a bend") {
+  // Painted only to the left of the driven line, once: texture coordinates are negative to its right.
+  StreetPlan plan = test::street(StreetKind::kHighway);
+  plan.moving_cars = false;
+  const Camera camera(test::lens(640, 240));
+  const View view = test::view_at(plan, 100);
+  const LightField light = test::draw(build_world(plan), camera, view);
+  const auto brightness = [&](double left, double from) {
+    double sum = 0.0;
+    for (double ahead = from; ahead < from + 8.0; ahead += 0.25) {
+      const auto pixel = camera.project({-left, 1.6, ahead});
+      REQUIRE(pixel);
+      sum += light.radiance[static_cast<std::size_t>(std::lround(pixel->y())) * 640U +
+                            static_cast<std::size_t>(std::lround(pixel->x()))];
+    }
+    return sum;
+  };
+  CHECK(brightness(-1.725, 6.0) > 1.5 * brightness(-1.2, 6.0));
+  CHECK(brightness(8.725, 22.0) > 1.5 * brightness(8.2, 22.0));
+  const auto crossings = [](const World& world) {
+    return std::count_if(world.faces.begin(), world.faces.end(),
+                         [](const Face& f) { return f.pattern == Pattern::kTwoLanes; });
+  };
+  CHECK(crossings(build_world(test::street(StreetKind::kTunnelLit))) == 0);
+  plan = test::street();
+  CHECK(crossings(build_world(plan)) > 0);
+  plan.driven = test::way({{200.0, 2.0}});
+  const World bend = build_world(plan);
+  for (const Face& f : bend.faces) {
+    if (f.pattern != Pattern::kTwoLanes) continue;
+    const Eigen::Vector3d& p = f.corner[0];
+    for (const auto& d : plan.driven) REQUIRE((d - p).norm() > 4.0);  // on the straight ends alone
+  }
+}
+
+TEST_CASE("corridors meet without holes, and the way is free") {
+  ScenarioConfig config = scenario("corridor");
+  config.camera.layout = CameraLayout::kMono;
+  const SimulatedDrive drive = simulate(config, 1);
+  const World world = world_of(drive);
+  const Camera camera(test::lens(160, 60));
+  const SimulatedRig rig = rig_of(drive);
+  for (double t_s = 0.0; t_s < 150.0; t_s += 2.5) {
+    CAPTURE(t_s);
+    const View view =
+        view_at(drive, rig.T_vehicle_left, config.start_utime + static_cast<std::int64_t>(std::llround(1e6 * t_s)));
+    const LightField light = test::draw(world, camera, view);
+    CHECK(std::all_of(light.depth.begin(), light.depth.end(), [](float d) { return std::isfinite(d); }));
+    CHECK(*std::min_element(light.depth.begin(), light.depth.end()) > 0.3F);
+  }
+}
+
+TEST_CASE("the second lap of city_loop looks like the first where it is the same place, and only there") {
+  ScenarioConfig config = scenario("city_loop");
+  config.camera.layout = CameraLayout::kMono;
+  config.scene.moving_cars = false;
+  const SimulatedDrive drive = simulate(config, 1);
+  const World world = world_of(drive);
+  const Camera camera(test::lens(400, 160));
+  const SimulatedRig rig = rig_of(drive);
+  const auto pose = [&](double t_s) {
+    return drive.kinematics_at(config.start_utime + static_cast<std::int64_t>(std::llround(1e6 * t_s))).T_enu_vehicle;
+  };
+  const auto detail = [&](double t_s) {
+    cv::Mat x;
+    cv::Mat smooth;
+    grey(world, camera,
+         view_at(drive, rig.T_vehicle_left, config.start_utime + static_cast<std::int64_t>(std::llround(1e6 * t_s))),
+         5e-4)
+        .convertTo(x, CV_32F);
+    cv::GaussianBlur(x, smooth, {}, 4.0);
+    return cv::Mat(x - smooth);
+  };
+  int pairs = 0;
+  for (double first = 20.0; first < 110.0; first += 15.0) {
+    double again = 0.0;
+    double nearest = 1e9;
+    for (double t_s = first + 40.0; t_s < 238.0; t_s += 0.02) {
+      const double d = (pose(t_s).p - pose(first).p).norm() + 20.0 * pose(t_s).q.angularDistance(pose(first).q);
+      if (d < nearest) nearest = d, again = t_s;
+    }
+    if (nearest > 0.2) continue;
+    CAPTURE(first, again, nearest);
+    ++pairs;
+    CHECK(correlation(detail(first), detail(again)) > 0.75);
+    double elsewhere = again;
+    while ((pose(elsewhere).p - pose(again).p).norm() < 25.0) elsewhere += 0.1;
+    CHECK(correlation(detail(first), detail(elsewhere)) < 0.5);
+  }
+  CHECK(pairs >= 4);
 }
 
 TEST_CASE("a tunnel has no holes") {
