@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "config/config_error.h"
+#include "simulation/faults.h"
 #include "simulation/scenarios.h"
 #include "support/temporary_folder.h"
 
@@ -39,6 +40,32 @@ TEST_CASE("a file changes what it names and keeps the rest of its scenario") {
   CHECK(config.motion.route == RouteKind::kTunnel);
   REQUIRE(config.faults.size() == 1);
   CHECK(fault_text(config.faults[0]) == "gnss.bias@4:east_m=3,north_m=0,up_m=0");
+}
+
+TEST_CASE("every fault is the same from a file and from the command line") {
+  const test::TemporaryFolder folder;
+  for (const FaultType& type : fault_types()) {
+    CAPTURE(type.name);
+    Fault fault(type, 12.5, 3.25);
+    std::string yaml = "scenario: highway\nfaults:\n  - {kind: " + type.name + ", start_s: 12.5, duration_s: 3.25";
+    for (std::size_t i = 0; i < type.parameters.size(); ++i) {
+      const FaultParameter& p = type.parameters[i];
+      fault.values[i] = p.min + 0.25 * (p.max - p.min);
+      yaml += ", " + std::string(p.key) + ": " + std::to_string(fault.values[i]);
+    }
+    const ScenarioConfig config = load_scenario(saved(folder, yaml + "}\n"));
+    REQUIRE(config.faults.size() == 1);
+    const Fault typed = parse_fault(fault_text(config.faults[0]));
+    CHECK(fault_text(typed) == fault_text(config.faults[0]));
+    CHECK(typed.sensor == type.sensor);
+    CHECK(typed.kind == type.kind);
+    CHECK(typed.start_s == 12.5);
+    CHECK(typed.duration_s == 3.25);
+    for (std::size_t i = 0; i < type.parameters.size(); ++i) {
+      CAPTURE(type.parameters[i].key);
+      CHECK(typed.values[i] == Approx(fault.values[i]).epsilon(1e-5).margin(1e-6));
+    }
+  }
 }
 
 TEST_CASE("what is wrong in a file is named with its line") {

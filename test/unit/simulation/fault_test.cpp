@@ -324,6 +324,122 @@ TEST_CASE("a jittering delay puts arrivals out of order, the normal link does no
   CHECK(disorder(drive_with("imu.delay@30+20:delay_s=0.01,jitter_s=0.05").deliveries.imu) > 100);
 }
 
+/// Standard deviation over the drive's fault time of what a noise fault of this factor leaves beyond the same noise
+/// at 1.
+template <class Value>
+double added_noise(const SimulatedDrive& before, const SimulatedDrive& after, std::size_t count, const Value& value) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < count; ++i) sum += std::pow(value(after, i) - value(before, i), 2);
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+TEST_CASE("a noise fault is the sensor's white noise times its factor and nobody is told") {
+  // The same draws three times as large: the difference is twice the noise.
+  ScenarioConfig config = base();
+  config.wheels.resolution_mps = 0.0;
+  const SimulatedDrive plain = simulate(config, 3);
+  const auto drive = [&](const char* text) { return drive_with(text, config); };
+  const SimulatedDrive imu = drive("imu.noise@0:factor=3");
+  const double gyro = config.imu.gyro_noise_radps_per_rthz * std::sqrt(config.imu.rate_hz);
+  CHECK(added_noise(plain, imu, imu.imu.size(), [](const auto& d, auto i) { return d.imu[i].gyro.x(); }) ==
+        Approx(2.0 * gyro).epsilon(0.05));
+  const double accel = config.imu.accel_noise_mps2_per_rthz * std::sqrt(config.imu.rate_hz);
+  CHECK(added_noise(plain, imu, imu.imu.size(), [](const auto& d, auto i) { return d.imu[i].accel.y(); }) ==
+        Approx(2.0 * accel).epsilon(0.05));
+  const SimulatedDrive gnss = drive("gnss.noise@0:factor=3");
+  CHECK(added_noise(plain, gnss, gnss.gnss.size(), [](const auto& d, auto i) {
+          return d.anchor.enu(d.gnss[i].antenna).x();
+        }) == Approx(2.0 * config.gnss.sigma_horizontal_m).epsilon(0.1));
+  CHECK(gnss.gnss[40].cov_enu == plain.gnss[40].cov_enu);
+  const SimulatedDrive wheels = drive("wheels.noise@0:factor=3");
+  CHECK(added_noise(plain, wheels, wheels.wheels.size(), [](const auto& d, auto i) { return d.wheels[i].speeds[1]; }) ==
+        Approx(2.0 * config.wheels.speed_noise_mps).epsilon(0.08));
+  const SimulatedDrive mag = drive("mag.noise@0:factor=3");
+  CHECK(added_noise(plain, mag, mag.mag.size(), [](const auto& d, auto i) { return 1e6 * d.mag[i].field.z(); }) ==
+        Approx(2.0 * config.mag.noise_ut).epsilon(0.08));
+}
+
+TEST_CASE("fixes without velocity have none and keep their position") {
+  const SimulatedDrive before = simulate(base(), 3);
+  const SimulatedDrive after = drive_with("gnss.no_velocity@30+20");
+  for (std::size_t i = 0; i < before.gnss.size(); ++i) {
+    const double t_s = seconds_between(before.config.start_utime, before.gnss[i].t_us);
+    CHECK(after.gnss[i].velocity.has_value() == (t_s < kStart || t_s >= kStart + kDuration));
+    CHECK(after.gnss[i].antenna.latitude == before.gnss[i].antenna.latitude);
+  }
+}
+
+TEST_CASE("what is repeated is the same message, in place of no other") {
+  const SimulatedDrive before = simulate(base(), 3);
+  const SimulatedDrive after = drive_with("gnss.repeat@30+20:probability=0.5");
+  std::size_t doubled = 0;
+  for (std::size_t i = 0, k = 0; i < after.gnss.size(); ++i, ++k) {
+    REQUIRE(after.gnss[i].t_us == before.gnss[k].t_us);
+    REQUIRE(after.gnss[i].antenna.latitude == before.gnss[k].antenna.latitude);
+    CHECK(after.deliveries.gnss[i].seq == static_cast<std::int64_t>(k));
+    if (i + 1 == after.gnss.size() || after.deliveries.gnss[i + 1].seq != after.deliveries.gnss[i].seq) continue;
+    ++doubled;
+    ++i;
+    CHECK(after.gnss[i].antenna.latitude == before.gnss[k].antenna.latitude);
+  }
+  CHECK(after.gnss.size() == before.gnss.size() + doubled);
+  CHECK(doubled == Approx(50).margin(20));
+}
+
+TEST_CASE("every sensor's link has its own offset, jitter, loss and disorder") {
+  const auto link_of = [](ScenarioConfig& c, Sensor sensor) -> LinkConfig& {
+    switch (sensor) {
+      case Sensor::kImu:
+        return c.imu.link;
+      case Sensor::kGnss:
+        return c.gnss.link;
+      case Sensor::kWheels:
+        return c.wheels.link;
+      case Sensor::kMag:
+        return c.mag.link;
+      case Sensor::kCamera:
+        break;
+    }
+    return c.camera.link;
+  };
+  const SimulatedDrive before = simulate(base(), 3);
+  for (const Sensor sensor : {Sensor::kImu, Sensor::kGnss, Sensor::kWheels, Sensor::kMag, Sensor::kCamera}) {
+    CAPTURE(int(sensor));
+    ScenarioConfig config = base();
+    LinkConfig& link = link_of(config, sensor);
+    link = {.clock_offset_s = 0.25, .stamp_jitter_s = 0.002, .delay_s = 0.1, .delay_jitter_s = 0.5};
+    link.drop_probability = 0.25;
+    const SimulatedDrive after = simulate(config, 3);
+    double late_s = 0.0;
+    double squares = 0.0;
+    double newest = 0.0;
+    double disorder = 0.0;
+    double count = 0.0;
+    const Rows rows = rows_of(after, sensor);
+    for (const auto& [true_us, list] : rows) {
+      for (const Row& row : list) {
+        const double stamp_s = 1e-6 * (row[row.size() - 2] - static_cast<double>(true_us));
+        const double arrival_us = row[row.size() - 1];
+        squares += std::pow(stamp_s - 0.25, 2);
+        late_s = std::max(late_s, 1e-6 * (arrival_us - static_cast<double>(true_us)));
+        disorder += arrival_us < newest ? 1.0 : 0.0;
+        newest = std::max(newest, arrival_us);
+        count += 1.0;
+      }
+    }
+    std::size_t sent = 0;
+    for (const auto& row : rows_of(before, sensor)) sent += row.second.size();
+    CHECK(count / static_cast<double>(sent) == Approx(0.75).margin(0.06));
+    CHECK(std::sqrt(squares / count) == Approx(0.002).epsilon(0.15));
+    CHECK(late_s > 0.5);
+    CHECK(late_s <= 0.6);
+    CHECK(disorder > 0.1 * count);
+    for (const Sensor other : {Sensor::kImu, Sensor::kGnss, Sensor::kWheels, Sensor::kMag, Sensor::kCamera}) {
+      if (other != sensor) CHECK(rows_of(before, other) == rows_of(after, other));
+    }
+  }
+}
+
 TEST_CASE("clock offset and drift of a link") {
   ScenarioConfig config = base();
   config.gnss.link.clock_offset_s = -0.1;
