@@ -18,7 +18,7 @@ lcm-logger --lcm-url="$url&recv_buf_size=4194304" -q "$folder/drive.lcm" >/dev/n
 mkdir "$folder/vehicle"; printf 'min_free_gib: 0\n' >"$folder/vehicle/recorder.yaml"
 "$bin/recorder" --config "$folder/vehicle" --folder "$folder/ours" --bus "$url" >/dev/null 2>>"$folder/stages.err" & recorder=$!
 stages=()
-for name in wheel_odometry gnss_ins_ekf imm_fusion; do
+for name in wheel_odometry gnss_ins_ekf vo_tracker imm_fusion; do
   "$bin/$name" --config "$config" --bus "$url" 2>>"$folder/stages.err" & stages+=($!)
 done
 sleep 1
