@@ -2,10 +2,21 @@
 
 #include <algorithm>
 
+#include "geometry/frames.h"
+
 namespace roadfix {
 namespace {
 
 constexpr double kMicrotesla = 1e-6;  ///< T
+constexpr double kMicroteslaPerTesla = 1e6;
+
+// The enums of lib/samples count like the constants of the messages.
+static_assert(static_cast<int>(FixType::kDeadReckoning) == gnss_t::FIX_DEAD_RECKONING);
+static_assert(static_cast<int>(FixType::kRtkFixed) == gnss_t::FIX_RTK_FIXED);
+static_assert(static_cast<int>(HeightKind::kEllipsoid) == gnss_t::HEIGHT_ELLIPSOID);
+static_assert(static_cast<int>(HeightKind::kMeanSeaLevel) == gnss_t::HEIGHT_MSL);
+static_assert(static_cast<int>(WheelDirection::kSigned) == wheels_t::DIRECTION_SIGNED);
+static_assert(static_cast<int>(WheelDirection::kReverse) == wheels_t::DIRECTION_REVERSE);
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
@@ -14,6 +25,12 @@ Eigen::Vector3d vector3(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
 
 void put(const Eigen::Vector3d& v, double (&out)[3]) {
   for (int i = 0; i < 3; ++i) out[i] = v(i);
+}
+
+void put(const Eigen::Matrix3d& m, double (&out)[3][3]) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) out[i][j] = m(i, j);
+  }
 }
 
 WheelDirection direction_of(int8_t code) {
@@ -44,6 +61,61 @@ WheelSample wheel_sample(const wheels_t& m) {
 }
 
 MagSample mag_sample(const mag_t& m) { return {m.utime, kMicrotesla * vector3(m.field_ut)}; }
+
+imu_t to_message(const ImuSample& sample) {
+  imu_t message{};
+  message.utime = sample.t_us;
+  put(sample.gyro, message.gyro_radps);
+  put(sample.accel, message.accel_mps2);
+  return message;
+}
+
+gnss_t to_message(const GnssFix& fix) {
+  gnss_t message{};
+  message.utime = fix.t_us;
+  message.fix_type = static_cast<int8_t>(fix.fix_type);
+  message.height_kind = static_cast<int8_t>(fix.height_kind);
+  message.lat_deg = fix.antenna.latitude / kDegree;
+  message.lon_deg = fix.antenna.longitude / kDegree;
+  message.height_m = fix.antenna.height;
+  put(fix.cov_enu, message.cov_enu_m2);
+  message.has_velocity = fix.velocity.has_value() ? 1 : 0;
+  if (fix.velocity) {
+    put(fix.velocity->enu, message.velocity_enu_mps);
+    put(fix.velocity->cov_enu, message.cov_velocity_enu_m2ps2);
+  }
+  message.has_heading = fix.heading.has_value() ? 1 : 0;
+  if (fix.heading) {
+    const double degrees = fix.heading->heading / kDegree;
+    message.heading_deg = degrees >= 360.0 ? degrees - 360.0 : degrees;
+    message.heading_std_deg = fix.heading->sigma / kDegree;
+  }
+  message.has_num_satellites = fix.num_satellites.has_value() ? 1 : 0;
+  message.num_satellites = static_cast<int16_t>(fix.num_satellites.value_or(0));
+  message.has_pdop = fix.pdop.has_value() ? 1 : 0;
+  message.pdop = fix.pdop.value_or(0.0);
+  message.has_correction_age = fix.correction_age.has_value() ? 1 : 0;
+  message.correction_age_s = fix.correction_age.value_or(0.0);
+  return message;
+}
+
+wheels_t to_message(const WheelSample& sample) {
+  wheels_t message{};
+  message.utime = sample.t_us;
+  message.direction = static_cast<int8_t>(sample.direction);
+  message.num_speeds = static_cast<int8_t>(sample.num_speeds);
+  std::copy(sample.speeds.begin(), sample.speeds.end(), message.speed_mps);
+  message.has_yaw_rate = sample.yaw_rate.has_value() ? 1 : 0;
+  message.yaw_rate_radps = sample.yaw_rate.value_or(0.0);
+  return message;
+}
+
+mag_t to_message(const MagSample& sample) {
+  mag_t message{};
+  message.utime = sample.t_us;
+  put(Eigen::Vector3d(sample.field * kMicroteslaPerTesla), message.field_ut);
+  return message;
+}
 
 Odometry odometry(const pose_t& m) {
   Odometry o;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "config/config_error.h"
@@ -13,24 +12,8 @@
 namespace roadfix {
 namespace {
 
-// The enums of lib/samples count like the constants of the messages.
-static_assert(static_cast<int>(FixType::kDeadReckoning) == gnss_t::FIX_DEAD_RECKONING);
-static_assert(static_cast<int>(FixType::kRtkFixed) == gnss_t::FIX_RTK_FIXED);
-static_assert(static_cast<int>(HeightKind::kEllipsoid) == gnss_t::HEIGHT_ELLIPSOID);
-static_assert(static_cast<int>(HeightKind::kMeanSeaLevel) == gnss_t::HEIGHT_MSL);
-static_assert(static_cast<int>(WheelDirection::kSigned) == wheels_t::DIRECTION_SIGNED);
-static_assert(static_cast<int>(WheelDirection::kReverse) == wheels_t::DIRECTION_REVERSE);
-
-constexpr double kMicroteslaPerTesla = 1e6;
-
 void copy(const Eigen::Vector3d& from, double (&to)[3]) {
   for (int i = 0; i < 3; ++i) to[i] = from[i];
-}
-
-void copy(const Eigen::Matrix3d& from, double (&to)[3][3]) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) to[i][j] = from(i, j);
-  }
 }
 
 void copy(const Eigen::Quaterniond& from, double (&to)[4]) {
@@ -67,61 +50,6 @@ void set_sigma(double sigma_m, pose_t& pose) {
 }
 
 }  // namespace
-
-imu_t to_message(const ImuSample& sample) {
-  imu_t message{};
-  message.utime = sample.t_us;
-  copy(sample.gyro, message.gyro_radps);
-  copy(sample.accel, message.accel_mps2);
-  return message;
-}
-
-gnss_t to_message(const GnssFix& fix) {
-  gnss_t message{};
-  message.utime = fix.t_us;
-  message.fix_type = static_cast<int8_t>(fix.fix_type);
-  message.height_kind = static_cast<int8_t>(fix.height_kind);
-  message.lat_deg = fix.antenna.latitude / kDegree;
-  message.lon_deg = fix.antenna.longitude / kDegree;
-  message.height_m = fix.antenna.height;
-  copy(fix.cov_enu, message.cov_enu_m2);
-  message.has_velocity = fix.velocity.has_value() ? 1 : 0;
-  if (fix.velocity) {
-    copy(fix.velocity->enu, message.velocity_enu_mps);
-    copy(fix.velocity->cov_enu, message.cov_velocity_enu_m2ps2);
-  }
-  message.has_heading = fix.heading.has_value() ? 1 : 0;
-  if (fix.heading) {
-    const double degrees = fix.heading->heading / kDegree;
-    message.heading_deg = degrees >= 360.0 ? degrees - 360.0 : degrees;
-    message.heading_std_deg = fix.heading->sigma / kDegree;
-  }
-  message.has_num_satellites = fix.num_satellites.has_value() ? 1 : 0;
-  message.num_satellites = static_cast<int16_t>(fix.num_satellites.value_or(0));
-  message.has_pdop = fix.pdop.has_value() ? 1 : 0;
-  message.pdop = fix.pdop.value_or(0.0);
-  message.has_correction_age = fix.correction_age.has_value() ? 1 : 0;
-  message.correction_age_s = fix.correction_age.value_or(0.0);
-  return message;
-}
-
-wheels_t to_message(const WheelSample& sample) {
-  wheels_t message{};
-  message.utime = sample.t_us;
-  message.direction = static_cast<int8_t>(sample.direction);
-  message.num_speeds = static_cast<int8_t>(sample.num_speeds);
-  std::copy(sample.speeds.begin(), sample.speeds.end(), message.speed_mps);
-  message.has_yaw_rate = sample.yaw_rate.has_value() ? 1 : 0;
-  message.yaw_rate_radps = sample.yaw_rate.value_or(0.0);
-  return message;
-}
-
-mag_t to_message(const MagSample& sample) {
-  mag_t message{};
-  message.utime = sample.t_us;
-  copy(Eigen::Vector3d(sample.field * kMicroteslaPerTesla), message.field_ut);
-  return message;
-}
 
 image_t to_message(const FrameFile& frame) {
   constexpr std::size_t kMaxPicture = std::size_t{1} << 27U;  // half of what one LCM message may hold

@@ -1,21 +1,14 @@
-/// Samples as messages, for whoever writes a drive log. The caller numbers them.
+/// Pictures and poses as messages, for whoever writes a drive log; samples: bus/sample_codec.h. The caller numbers them.
 #pragma once
 
-#include <roadfix/gnss_t.hpp>
 #include <roadfix/image_t.hpp>
-#include <roadfix/imu_t.hpp>
-#include <roadfix/mag_t.hpp>
 #include <roadfix/pose_t.hpp>
-#include <roadfix/wheels_t.hpp>
 
+#include "bus/sample_codec.h"
 #include "roadfix/import/drive.h"
 
 namespace roadfix {
 
-imu_t to_message(const ImuSample& sample);
-gnss_t to_message(const GnssFix& fix);
-wheels_t to_message(const WheelSample& sample);
-mag_t to_message(const MagSample& sample);
 /// The picture's own bytes; ConfigError where the file is gone or neither JPEG nor PNG.
 image_t to_message(const FrameFile& frame);
 
