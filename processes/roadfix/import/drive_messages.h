@@ -1,4 +1,5 @@
-/// Pictures and poses as messages, for whoever writes a drive log; samples: bus/sample_codec.h. The caller numbers them.
+/// Pictures and poses as messages, for whoever writes a drive log; samples: bus/sample_codec.h. The caller numbers
+/// them.
 #pragma once
 
 #include <roadfix/image_t.hpp>

@@ -1,0 +1,66 @@
+#include "drivers/device/device_session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace roadfix {
+
+bool DeviceSession::open(Clock::time_point now) {
+  try {
+    source_ = open_();
+  } catch (const SourceError& e) {
+    lose(now, e.what());
+    return false;
+  }
+  heard_ = now;
+  why_.clear();
+  ++openings_;
+  return true;
+}
+
+void DeviceSession::lose(Clock::time_point now, const std::string& why) {
+  source_.reset();
+  why_ = why;
+  const std::chrono::duration<double> first(config_.reopen_first), most(config_.reopen_max);
+  pause_ = pause_ == pause_.zero() ? first : std::min(2.0 * pause_, most);
+  due_ = now + std::chrono::duration_cast<Clock::duration>(pause_);
+}
+
+bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds patience, std::vector<Packet>& packets) {
+  if (ended_) return false;
+  if (!source_) {
+    if (!due_ || now >= *due_) return open(now);
+    std::this_thread::sleep_for(std::min<Clock::duration>(patience, *due_ - now));
+    return false;
+  }
+  switch (source_->read(patience, packets)) {
+    case ReadState::kData:
+      heard_ = now;
+      pause_ = pause_.zero();
+      break;
+    case ReadState::kNothing:
+      break;
+    case ReadState::kEnd:
+      ended_ = true;
+      break;
+    case ReadState::kLost:
+      lose(now, name() + ": went away");
+      break;
+  }
+  return false;
+}
+
+std::string DeviceSession::trouble(Clock::time_point now) const {
+  if (ended_) return {};
+  if (!source_) {
+    if (why_.empty()) return config_.device + ": not opened yet";
+    const double wait_s = due_ ? std::max(0.0, std::chrono::duration<double>(*due_ - now).count()) : 0.0;
+    return fmt::format("{}; tried again in {:.1f} s", why_, wait_s);
+  }
+  const double silent_s = std::chrono::duration<double>(now - heard_).count();
+  return silent_s > config_.silence ? fmt::format("{}: no byte for {:.0f} s", name(), silent_s) : std::string();
+}
+
+}  // namespace roadfix

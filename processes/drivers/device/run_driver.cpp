@@ -1,0 +1,121 @@
+#include "drivers/device/run_driver.h"
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <roadfix/raw_t.hpp>
+
+#include "bus/log_reader.h"
+#include "bus/log_writer.h"
+#include "bus/network_bus.h"
+#include "bus/run_process.h"
+#include "bus/schema.h"
+#include "drivers/device/live_driver.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr auto kPatience = std::chrono::milliseconds(50);
+
+struct Arguments {
+  std::string config;
+  std::string bus = kDefaultBusUrl;
+  std::string device;
+  std::string log_in;
+  std::string log_out;
+  bool print_config = false;
+};
+
+class LogOutputs : public SensorOutputs {
+ public:
+  explicit LogOutputs(LogWriter& log) : log_(log) {}
+
+ protected:
+  void send(const std::string& channel, int64_t utime, std::span<const uint8_t> bytes) override {
+    log_.write(channel, utime, bytes);
+  }
+
+ private:
+  LogWriter& log_;
+};
+
+void run_live(const Arguments& arguments, const DriverSetup& setup) {
+  NetworkBus bus(arguments.bus);
+  catch_stop_signals();
+  LiveDriver driver(setup, bus);
+  std::string said;
+  while (!stop_requested() && driver.step(kPatience)) {
+    const std::string trouble = driver.trouble();
+    const std::string kind = trouble.substr(0, trouble.find(';'));
+    if (kind == said) continue;
+    said = kind;
+    std::cerr << setup.name << ": " << (trouble.empty() ? driver.device_name() + ": bytes come" : trouble) << std::endl;
+  }
+  driver.stop();
+}
+
+void run(const Arguments& arguments, const DriverProgram& program) {
+  const DriverSetup setup = program.read(arguments.config, arguments.device);
+  if (arguments.print_config) {
+    std::cout << setup.config;
+  } else if (arguments.log_in.empty()) {
+    run_live(arguments, setup);
+  } else {
+    const DriverReplay result = replay_driver(arguments.log_in, arguments.log_out, setup);
+    std::cout << arguments.log_out << ": " << result.messages << " messages from " << result.raw << " raw ones, "
+              << result.lost << " of which are missing" << std::endl;
+  }
+}
+
+}  // namespace
+
+DriverReplay replay_driver(const std::filesystem::path& in, const std::filesystem::path& out,
+                           const DriverSetup& setup) {
+  const MessageCheck check = Schema::built_in().check_of("raw_t");
+  LogReader reader(in);
+  LogWriter writer(out);
+  LogOutputs outputs(writer);
+  RawReader raw_reader(setup, outputs);
+  DriverReplay result;
+  while (const std::optional<LogEvent> event = reader.next()) {
+    const auto channel = std::find(setup.raw_channels.begin(), setup.raw_channels.end(), event->channel);
+    if (channel == setup.raw_channels.end() || check(event->data) != CheckResult::kOk) continue;
+    const raw_t raw = decode<raw_t>(event->data);
+    const Header header{raw.utime, raw.run, raw.seq};
+    if (!is_plausible(header)) continue;
+    ++result.raw;
+    const std::span<const uint8_t> bytes(raw.data.data(), raw.data.size());
+    raw_reader.take(static_cast<int>(channel - setup.raw_channels.begin()), header, bytes);
+  }
+  result.lost = raw_reader.lost();
+  result.messages = writer.events();
+  writer.commit();
+  return result;
+}
+
+int run_driver(int argc, char** argv, const DriverProgram& program) {
+  constexpr int kUserError = 2;
+  Arguments arguments;
+  CLI::App app{program.description, program.name};
+  app.footer(program.footer);
+  app.add_option("--config", arguments.config, "The vehicle's configuration folder")->required();
+  app.add_option("--bus", arguments.bus, "LCM URL")->capture_default_str();
+  app.add_option("--device", arguments.device, "Instead of the configured device");
+  CLI::Option* log_in = app.add_option("--log-in", arguments.log_in, "Take the raw bytes from this log, not a device");
+  CLI::Option* log_out = app.add_option("--log-out", arguments.log_out, "Write the messages to this log");
+  log_in->needs(log_out);
+  log_out->needs(log_in);
+  app.add_flag("--print-config", arguments.print_config, "Print the effective configuration and end");
+  try {
+    app.parse(argc, argv);
+    run(arguments, program);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : kUserError;
+  } catch (const std::exception& e) {
+    std::cerr << program.name << ": " << e.what() << "\n";
+    return kUserError;
+  }
+  return 0;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,106 @@
+// Serial ports and pseudo-terminals.
+#include <fcntl.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include "drivers/device/byte_source.h"
+
+namespace roadfix {
+
+namespace {
+
+constexpr std::array<std::pair<int, speed_t>, 16> kSpeeds = {{{1200, B1200},
+                                                              {2400, B2400},
+                                                              {4800, B4800},
+                                                              {9600, B9600},
+                                                              {19200, B19200},
+                                                              {38400, B38400},
+                                                              {57600, B57600},
+                                                              {115200, B115200},
+                                                              {230400, B230400},
+                                                              {460800, B460800},
+                                                              {500000, B500000},
+                                                              {921600, B921600},
+                                                              {1000000, B1000000},
+                                                              {2000000, B2000000},
+                                                              {3000000, B3000000},
+                                                              {4000000, B4000000}}};
+
+speed_t speed_of(int baud) {
+  std::string all;
+  for (const auto& [rate, speed] : kSpeeds) {
+    if (rate == baud) return speed;
+    all += " " + std::to_string(rate);
+  }
+  throw std::invalid_argument("baud = " + std::to_string(baud) + ": no such rate; there are" + all);
+}
+
+/// Bytes as they are: no echo, no line editing, no translation of line ends.
+void make_raw(int descriptor, speed_t speed, const std::string& name) {
+  termios settings{};
+  if (::tcgetattr(descriptor, &settings) != 0) throw SourceError(name + ": is no serial port");
+  ::cfmakeraw(&settings);
+  settings.c_cflag |= CLOCAL | CREAD;
+  settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB);
+  settings.c_cc[VMIN] = 0;
+  settings.c_cc[VTIME] = 0;
+  if (::cfsetspeed(&settings, speed) != 0 || ::tcsetattr(descriptor, TCSANOW, &settings) != 0) {
+    throw SourceError(name + ": " + std::strerror(errno));
+  }
+}
+
+/// Ours from both ends, so that it lives as long as the source, whoever opens and closes it outside.
+class PtySource : public DescriptorSource {
+ public:
+  PtySource(int main, int end, std::string name) : DescriptorSource(main, std::move(name)), end_(end) {}
+  ~PtySource() override { ::close(end_); }
+  PtySource(const PtySource&) = delete;
+  PtySource& operator=(const PtySource&) = delete;
+
+ private:
+  int end_;
+};
+
+/// A serial port gives 0 bytes where a file would be over: nothing came, or it is gone.
+class SerialSource : public DescriptorSource {
+ public:
+  using DescriptorSource::DescriptorSource;
+  ~SerialSource() override { ::ioctl(descriptor(), TIOCNXCL); }
+  SerialSource(const SerialSource&) = delete;
+  SerialSource& operator=(const SerialSource&) = delete;
+};
+
+}  // namespace
+
+std::unique_ptr<ByteSource> open_serial(const std::string& path, int baud) {
+  const speed_t speed = speed_of(baud);
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) throw SourceError(path + ": " + std::strerror(errno));
+  auto source = std::make_unique<SerialSource>(descriptor, path);
+  make_raw(descriptor, speed, path);
+  ::ioctl(descriptor, TIOCEXCL);  // two readers would share the bytes between them
+  ::tcflush(descriptor, TCIFLUSH);
+  return source;
+}
+
+std::unique_ptr<ByteSource> open_pty() {
+  const int main = ::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (main < 0 || ::grantpt(main) != 0 || ::unlockpt(main) != 0) {
+    if (main >= 0) ::close(main);
+    throw SourceError(std::string("pty: ") + std::strerror(errno));
+  }
+  const std::string name = ::ptsname(main);
+  const int end = ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  auto source = std::make_unique<PtySource>(main, end, name);
+  make_raw(end, B115200, name);
+  return source;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,412 @@
+// Drivers on a bus, with devices that are pseudo-terminals, sockets and files: unplugged, replugged, and replayed.
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iostream>
+#include <opencv2/imgcodecs.hpp>
+#include <roadfix/gnss_t.hpp>
+#include <roadfix/heartbeat_t.hpp>
+#include <roadfix/image_t.hpp>
+#include <roadfix/imu_t.hpp>
+#include <roadfix/raw_t.hpp>
+#include <roadfix/wheels_t.hpp>
+#include <thread>
+
+#include "bus/log_reader.h"
+#include "bus/log_writer.h"
+#include "bus/memory_bus.h"
+#include "config/config.h"
+#include "drivers/camera_driver/handler.h"
+#include "drivers/camera_driver/pnm.h"
+#include "drivers/device/live_driver.h"
+#include "drivers/device/run_driver.h"
+#include "drivers/gnss_driver/handler.h"
+#include "drivers/imu_driver/handler.h"
+#include "drivers/wheel_driver/handler.h"
+#include "support/driver_run.h"
+#include "support/temporary_folder.h"
+
+namespace roadfix {
+namespace {
+
+using test::Bytes;
+using test::Sent;
+
+/// A made serial device: what is written here arrives there.
+class Pty {
+ public:
+  Pty() : main_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+    REQUIRE(::grantpt(main_) == 0);
+    REQUIRE(::unlockpt(main_) == 0);
+    name_ = ::ptsname(main_);
+  }
+  ~Pty() { ::close(main_); }
+  Pty(const Pty&) = delete;
+  Pty& operator=(const Pty&) = delete;
+
+  void write(const Bytes& bytes) const {
+    REQUIRE(::write(main_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()));
+  }
+  [[nodiscard]] Bytes read() const {
+    Bytes bytes(65536);
+    const ssize_t size = ::read(main_, bytes.data(), bytes.size());
+    bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
+    return bytes;
+  }
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  int main_;
+  std::string name_;
+};
+
+/// A driver on a bus of memory, with everything that it published.
+class Bench {
+ public:
+  explicit Bench(DriverSetup setup) : setup_(std::move(setup)), driver_(setup_, bus_) {
+    bus_.subscribe(".*", [this](const BusMessage& m) {
+      sent.push_back({std::string(m.channel), {m.bytes.begin(), m.bytes.end()}});
+    });
+  }
+  template <class Done>
+  bool step_until(const Done& done) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!done()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      more = driver_.step(std::chrono::milliseconds(5));
+      bus_.handle(std::chrono::milliseconds(0));
+    }
+    return true;
+  }
+  [[nodiscard]] std::size_t count(const std::string& channel) const {
+    return static_cast<std::size_t>(
+        std::count_if(sent.begin(), sent.end(), [&](const Sent& s) { return s.channel == channel; }));
+  }
+  [[nodiscard]] heartbeat_t heartbeat() const {
+    for (auto s = sent.rbegin(); s != sent.rend(); ++s)
+      if (s->channel.starts_with("HEARTBEAT_")) return decode<heartbeat_t>(s->bytes);
+    return {};
+  }
+  LiveDriver& driver() { return driver_; }
+  const DriverSetup& setup() { return setup_; }
+
+  std::vector<Sent> sent;
+  bool more = true;
+
+ private:
+  DriverSetup setup_;
+  MemoryBus bus_;
+  LiveDriver driver_;
+};
+
+/// What a replay of the bench's raw messages gives.
+std::vector<Sent> replayed(Bench& bench) {
+  const test::TemporaryFolder folder;
+  {
+    LogWriter log(folder / "raw.lcm");
+    for (const Sent& s : bench.sent)
+      if (s.channel.starts_with("RAW_")) log.write(s.channel, read_header(s.bytes)->utime, s.bytes);
+    log.commit();
+  }
+  replay_driver(folder / "raw.lcm", folder / "out.lcm", bench.setup());
+  LogReader reader(folder / "out.lcm");
+  std::vector<Sent> out;
+  while (const auto event = reader.next())
+    out.push_back({std::string(event->channel), {event->data.begin(), event->data.end()}});
+  return out;
+}
+
+std::vector<Sent> sensor_messages(const Bench& bench) {
+  std::vector<Sent> out;
+  for (const Sent& s : bench.sent)
+    if (!s.channel.starts_with("RAW_") && !s.channel.starts_with("HEARTBEAT_") && !s.channel.starts_with("CONFIG_"))
+      out.push_back(s);
+  return out;
+}
+
+DeviceConfig quick(const std::string& device) {
+  DeviceConfig c;
+  c.device = device;
+  c.reopen_first = 0.01;
+  c.reopen_max = 0.05;
+  return c;
+}
+
+Bytes imu_frame(uint32_t t_us) {
+  test::Payload p(32);
+  p.at<uint32_t>(0, t_us).at<uint16_t>(4, 0x03FF).at<int32_t>(14, -10'000'000);
+  return test::sbg_bytes(kSbgImuShort, p.bytes());
+}
+
+TEST_CASE("a pseudo-terminal end to end: raw bytes, samples, and the same samples from the raw bytes") {
+  const Pty pty;
+  ImuDriverConfig config;
+  config.device = quick(pty.name());
+  Bench bench(imu_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return bench.count("RAW_IMU") > 0; }));  // opened
+  for (uint32_t i = 0; i < 50; ++i) {
+    Bytes bytes = imu_frame(5000 * i);
+    if (i % 7 == 3) bytes[10] ^= 1U;                                        // a wrong checksum
+    if (i % 5 == 0) test::append(bytes, test::bytes_of("\xFF\x5A noise"));  // half a beginning
+    const auto cut = bytes.begin() + (i % 20);
+    pty.write({bytes.begin(), cut});
+    REQUIRE(bench.step_until(
+        [raws = bench.count("RAW_IMU"), &bench, i] { return i % 20 == 0 || bench.count("RAW_IMU") > raws; }));
+    pty.write({cut, bytes.end()});
+    REQUIRE(bench.step_until([raws = bench.count("RAW_IMU"), &bench] { return bench.count("RAW_IMU") > raws; }));
+  }
+  REQUIRE(bench.count("IMU") > 20);
+  CHECK(bench.count("IMU") <= 43);
+  const std::vector<Sent> live = sensor_messages(bench);
+  CHECK(replayed(bench) == live);
+  bench.sent.erase(
+      std::find_if(bench.sent.begin() + 60, bench.sent.end(), [](const Sent& s) { return s.channel == "RAW_IMU"; }));
+  CHECK(replayed(bench) != live);  // teeth: a lost raw message shows
+}
+
+TEST_CASE("unplugged and plugged in again: said in the heartbeat, opened again with pauses") {
+  const test::TemporaryFolder folder;
+  const std::string link = (folder / "imu").string();
+  ImuDriverConfig config;
+  config.device = quick(link);
+  Bench bench(imu_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return bench.driver().trouble().find("No such file") != std::string::npos; }));
+  uint32_t t_us = 0;
+  for (int round = 0; round < 3; ++round) {
+    {
+      const Pty pty;
+      std::filesystem::create_symlink(pty.name(), link);
+      const std::size_t raws = bench.count("RAW_IMU");
+      REQUIRE(bench.step_until([&] { return bench.count("RAW_IMU") > raws; }));
+      const std::size_t samples = bench.count("IMU");
+      REQUIRE(bench.step_until([&] {
+        pty.write(imu_frame(t_us += 5000));
+        return bench.count("IMU") > samples + 3;
+      }));
+      CHECK(bench.driver().trouble().empty());
+    }
+    std::filesystem::remove(link);
+    REQUIRE(bench.step_until([&] { return !bench.driver().trouble().empty(); }));
+  }
+  bench.driver().stop();
+  REQUIRE(bench.step_until([&] { return bench.heartbeat().state == heartbeat_t::STATE_STOPPING; }));
+  CHECK(bench.heartbeat().state_reason.find("tried again in") != std::string::npos);
+  CHECK(replayed(bench) == sensor_messages(bench));
+}
+
+TEST_CASE("a device that says nothing is a trouble") {
+  const Pty pty;
+  ImuDriverConfig config;
+  config.device = quick(pty.name());
+  config.device.silence = 0.05;
+  Bench bench(imu_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return bench.driver().trouble().find("no byte for") != std::string::npos; }));
+}
+
+TEST_CASE("the pauses between attempts grow to their limit, and begin anew after bytes") {
+  DeviceConfig config;
+  config.device = "x";
+  config.reopen_first = 1.0;
+  config.reopen_max = 4.0;
+  int attempts = 0;
+  DeviceSession session(
+      [&]() -> std::unique_ptr<ByteSource> {
+        ++attempts;
+        throw SourceError("gone");
+      },
+      config);
+  const DeviceSession::Clock::time_point begin{};
+  std::vector<int> at_s;
+  std::vector<Packet> packets;
+  for (int ds = 0; ds < 200; ++ds) {
+    const int before = attempts;
+    session.step(begin + std::chrono::milliseconds(100 * ds), std::chrono::milliseconds(0), packets);
+    if (attempts > before) at_s.push_back(ds / 10);
+  }
+  CHECK(at_s == std::vector<int>{0, 1, 3, 7, 11, 15, 19});
+}
+
+TEST_CASE("candump lines from a file become wheel speeds, the file's end ends the driver, replay agrees") {
+  const test::TemporaryFolder folder;
+  {
+    std::ofstream file(folder / "can.log");
+    for (int i = 0; i < 30; ++i)
+      file << "(1700000000.0" << (10 + i) << "000) can0 123#"
+           << "E803" << (i == 7 ? "x" : "") << "\n";
+  }
+  WheelDriverConfig config;
+  config.device = quick("candump:" + (folder / "can.log").string());
+  config.speeds.resize(1);
+  config.speeds[0].frame = "123";
+  config.speeds[0].length = 16;
+  config.speeds[0].factor = 0.01;
+  Bench bench(wheel_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return !bench.more; }));
+  CHECK(bench.count("WHEELS") == 29);
+  CHECK(replayed(bench) == sensor_messages(bench));
+}
+
+TEST_CASE("SocketCAN: an interface that is not there is said") {
+  CHECK_THROWS_WITH(open_byte_source(quick("can:roadfix_none")), Catch::Contains("can:roadfix_none"));
+}
+
+TEST_CASE("SocketCAN: frames of vcan0 come in") {
+  try {
+    const auto source = open_byte_source(quick("can:vcan0"));
+    std::vector<Packet> packets;
+    CHECK(source->read(std::chrono::milliseconds(1), packets) == ReadState::kNothing);
+  } catch (const SourceError& e) {
+    std::cout << "skipped: " << e.what() << "\n";
+  }
+}
+
+TEST_CASE("devices that cannot be are told apart from those that are not there") {
+  CHECK_THROWS_AS(open_byte_source(quick("ttyUSB0")), std::invalid_argument);
+  CHECK_THROWS_AS(open_byte_source(quick("tcp:nowhere")), std::invalid_argument);
+  DeviceConfig odd = quick("/dev/null");
+  CHECK_THROWS_AS(open_byte_source(odd), SourceError);
+  odd.baud = 12345;
+  CHECK_THROWS_WITH(open_byte_source(odd), Catch::Contains("115200"));
+  CHECK_THROWS_AS(open_byte_source(quick("file:/no/such/file")), SourceError);
+  CHECK_THROWS_AS(open_byte_source(quick("tcp:127.0.0.1:1")), SourceError);
+}
+
+/// A server on the loop-back that takes one connection, sends, and keeps what it hears.
+class Server {
+ public:
+  explicit Server(Bytes answer) : answer_(std::move(answer)), socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    REQUIRE(::bind(socket_, reinterpret_cast<sockaddr*>(&address), size) == 0);
+    REQUIRE(::listen(socket_, 1) == 0);
+    REQUIRE(::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size) == 0);
+    port_ = ntohs(address.sin_port);
+    thread_ = std::thread([this] { serve(); });
+  }
+  ~Server() {
+    ::shutdown(socket_, SHUT_RDWR);
+    thread_.join();
+    ::close(socket_);
+  }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  [[nodiscard]] int port() const { return port_; }
+  [[nodiscard]] const std::string& heard() const { return heard_; }  ///< after the end
+
+ private:
+  void serve() {
+    const int peer = ::accept(socket_, nullptr, nullptr);
+    if (peer < 0) return;
+    static_cast<void>(!::write(peer, answer_.data(), answer_.size()));
+    char buffer[4096];
+    for (ssize_t n = 1; n > 0;) {
+      n = ::read(peer, buffer, sizeof buffer);
+      if (n > 0) heard_.append(buffer, static_cast<std::size_t>(n));
+    }
+    ::close(peer);
+  }
+
+  Bytes answer_;
+  int socket_;
+  int port_ = 0;
+  std::string heard_;
+  std::thread thread_;
+};
+
+TEST_CASE("a receiver over TCP") {
+  Bytes stream;
+  for (int i = 10; i < 20; ++i) {
+    const std::string time = "1200" + std::to_string(i) + ".00";
+    test::append(stream, test::nmea_bytes("GPGGA," + time + ",4800.0,N,00200.0,E,1,8,1.0,100,M,44,M,,"));
+  }
+  Server server(stream);
+  GnssDriverConfig config;
+  config.device = quick("tcp:127.0.0.1:" + std::to_string(server.port()));
+  Bench bench(gnss_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return bench.count("GNSS") >= 1; }));
+  CHECK(replayed(bench) == sensor_messages(bench));
+}
+
+TEST_CASE("NTRIP: corrections go to the receiver, its position to the caster") {
+  const Bytes corrections = test::rtcm_bytes({0x3E, 0xD0, 0x55, 0x66});
+  Bytes answer = test::bytes_of("ICY 200 OK\r\n");
+  test::append(answer, corrections);
+  Server caster(answer);
+  std::string heard;
+  {
+    const Pty receiver;
+    GnssDriverConfig config;
+    config.device = quick(receiver.name());
+    config.ntrip = NtripConfig{"127.0.0.1", caster.port(), "NEAR", "", "", 0.1};
+    Bench bench(gnss_driver_setup(config));
+    REQUIRE(bench.step_until([&] { return bench.count("RAW_GNSS") > 0; }));
+    receiver.write(test::nmea_bytes("GPGGA,120000.00,4800.0,N,00200.0,E,1,8,1.0,100,M,44,M,,"));
+    Bytes got;
+    REQUIRE(bench.step_until([&] {
+      test::append(got, receiver.read());
+      return got.size() >= corrections.size() && bench.count("RAW_NTRIP") > 0 && bench.driver().trouble().empty();
+    }));
+    CHECK(got == corrections);
+    REQUIRE(bench.step_until([&] { return bench.count("GNSS") > 0; }));
+    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(500);
+    REQUIRE(bench.step_until([&] { return std::chrono::steady_clock::now() > until; }));  // for the position to be sent
+  }
+  // The connection is closed with the driver; the server has heard all by its end.
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  CHECK(caster.heard().starts_with("GET /NEAR HTTP/1.1"));
+  CHECK(caster.heard().find("$GPGGA,") != std::string::npos);
+}
+
+TEST_CASE("pictures from files: JPEG out, the same again from the raw ones, one stamp for a pair") {
+  const test::TemporaryFolder folder;
+  for (int i = 0; i < 6; ++i) {
+    cv::Mat picture(48, 64, CV_8UC3, cv::Scalar(20 * i, 100, 200 - 10 * i));
+    REQUIRE(cv::imwrite((folder / ("frame_" + std::to_string(i) + ".png")).string(), picture));
+  }
+  CameraDriverConfig config;
+  const std::string pattern = (folder / "frame_%d.png").string();
+  config.devices = {pattern, pattern};
+  config.synchronised = true;
+  config.rate = 100.0;
+  config.publish_raw = true;
+  Bench bench(camera_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return !bench.more; }));
+  CHECK(bench.count("CAMERA_LEFT") == 6);
+  CHECK(bench.count("CAMERA_RIGHT") == 6);
+  CHECK(bench.count("RAW_CAMERA_LEFT") == 7);  // with the opening
+  const std::vector<Sent> live = sensor_messages(bench);
+  CHECK(replayed(bench) == live);
+  const image_t left = decode<image_t>(live[0].bytes), right = decode<image_t>(live[1].bytes);
+  CHECK(left.utime == right.utime);
+  CHECK(left.width_px == 64);
+  CHECK(left.format == image_t::FORMAT_JPEG);
+}
+
+TEST_CASE("pictures as bytes: PNM there and back, sizes of JPEG, and garbage") {
+  cv::Mat colour(5, 7, CV_8UC3);
+  for (int i = 0; i < 105; ++i) colour.data[i] = static_cast<uint8_t>(i * 37);
+  const cv::Mat gray = cv::Mat(5, 7, CV_8UC1, colour.data).clone();
+  for (const cv::Mat& picture : {colour, gray}) {
+    const Bytes bytes = write_pnm(picture);
+    const cv::Mat back = read_pnm(bytes);
+    REQUIRE(back.size() == picture.size());
+    REQUIRE(back.type() == picture.type());
+    CHECK(cv::norm(back, picture, cv::NORM_INF) == 0.0);
+    for (std::size_t n = 0; n < bytes.size(); ++n) CHECK(read_pnm({bytes.data(), n}).empty());
+  }
+  for (const std::string text : {"P6\n-1 5\n255\n", "P6\n99999 99999\n255\n", "P5\n1 1\n65535\nx", "P5\n"})
+    CHECK(read_pnm(test::bytes_of(text)).empty());
+  Bytes jpeg;
+  REQUIRE(cv::imencode(".jpg", colour, jpeg));
+  CHECK(read_jpeg_size(jpeg) == cv::Size(7, 5));
+  for (std::size_t n = 0; n < 40; ++n) static_cast<void>(read_jpeg_size({jpeg.data(), n}));
+}
+
+}  // namespace
+}  // namespace roadfix
