@@ -19,11 +19,13 @@ if [[ $trouble == ip_loss ]]; then
   unshare -n sleep 100 & other=$!
   sleep 0.3
   there=(nsenter -t "$other" -n)
-  ip link add here type veth peer name there
+  ip link add here type veth peer name there 2>/dev/null || { echo "skipped: the kernel gives no veth link"; exit 0; }
   ip link set there netns "$other"
   ip addr add 10.9.0.1/24 dev here && ip link set here up && ip route add 224.0.0.0/4 dev here
-  "${there[@]}" bash -c 'ip addr add 10.9.0.2/24 dev there && ip link set lo up && ip link set there up && ip route add 224.0.0.0/4 dev there
-    nft "add table ip loss; add chain ip loss in { type filter hook input priority 0; }; add rule ip loss in iif there udp dport 7667 numgen random mod 1000 == 0 counter drop"'
+  "${there[@]}" bash -c 'ip addr add 10.9.0.2/24 dev there && ip link set lo up && ip link set there up && ip route add 224.0.0.0/4 dev there'
+  rules='add table ip loss; add chain ip loss in { type filter hook input priority 0; }
+    add rule ip loss in iif there udp dport 7667 numgen random mod 1000 == 0 counter drop'
+  "${there[@]}" nft "$rules" 2>/dev/null || { echo "skipped: the kernel refuses nft's rules"; exit 0; }
   sleep 1
 else
   ip link set lo up && ip route add 224.0.0.0/4 dev lo
