@@ -1,6 +1,8 @@
 #include "bus/replay.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
@@ -10,6 +12,8 @@
 namespace roadfix {
 
 namespace {
+
+constexpr int64_t kNever = std::numeric_limits<int64_t>::min();
 
 class Replayer : public MessageSink {
  public:
@@ -30,6 +34,11 @@ class Replayer : public MessageSink {
     int input = 0;
     int order = 0;
   };
+  /// Where a stage begins: at once, or at a snapshot.
+  struct Beginning {
+    int64_t inputs_after = kNever;   // inputs up to this utime are in the state
+    int64_t outputs_after = kNever;  // and these had been published
+  };
   struct Write {
     std::string channel;
     int64_t seq = 0;
@@ -38,6 +47,8 @@ class Replayer : public MessageSink {
 
   void route(std::size_t stage);
   void require_clock(const StageRunner& runner) const;
+  [[nodiscard]] bool is_copied(const std::string& channel) const;
+  void begin_at_snapshot(std::size_t stage);
   void dispatch(std::size_t begin, std::size_t end);
   void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) override;
   void write_group();
@@ -47,6 +58,7 @@ class Replayer : public MessageSink {
   LogReader reader_;
   LogWriter writer_;
   std::vector<std::unique_ptr<StageRunner>> runners_;
+  std::vector<Beginning> beginnings_;
   std::map<std::string, std::vector<Route>> routes_;
   std::map<std::string, std::size_t> producers_;
   LogIndex index_;
@@ -58,7 +70,7 @@ class Replayer : public MessageSink {
 
 Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path& out,
                    std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options)
-    : options_(options), reader_(in), writer_(out), inboxes_(stages.size()) {
+    : options_(options), reader_(in), writer_(out), beginnings_(stages.size()), inboxes_(stages.size()) {
   for (std::unique_ptr<Stage>& stage : stages) {
     runners_.push_back(std::make_unique<StageRunner>(std::move(stage), *this));
     if (options.timing) runners_.back()->measure_time();
@@ -66,11 +78,38 @@ Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path&
   }
   index_ = index_logs({&reader_}, [&](std::string_view channel) {
     const std::string name(channel);
-    const auto& copied = options_.copied_channels;
-    return (routes_.contains(name) && !producers_.contains(name)) ||
-           std::find(copied.begin(), copied.end(), name) != copied.end();
+    const bool is_read = routes_.contains(name) && (options_.from_s || !producers_.contains(name));
+    return is_read || is_copied(name) || (options_.from_s && name.starts_with("STATE_"));
   });
   for (const auto& runner : runners_) require_clock(*runner);
+  if (!options_.from_s) return;
+  for (std::size_t stage = 0; stage < runners_.size(); ++stage) begin_at_snapshot(stage);
+}
+
+bool Replayer::is_copied(const std::string& channel) const {
+  const auto& copied = options_.copied_channels;
+  return std::find(copied.begin(), copied.end(), channel) != copied.end();
+}
+
+void Replayer::begin_at_snapshot(std::size_t stage) {
+  StageRunner& runner = *runners_[stage];
+  const int channel = index_.channel(stage_channel("STATE_", runner.spec().name));
+  const int64_t until = index_.messages.front().header.utime + std::llround(*options_.from_s * 1e6);
+  const MessageCheck check = Schema::built_in().check_of("state_t");
+  const IndexedMessage* last = nullptr;
+  for (const IndexedMessage& message : index_.messages) {
+    if (message.channel != channel || message.header.utime > until) continue;
+    if (check(reader_.at(message.offset).data) == CheckResult::kOk) last = &message;
+  }
+  if (last == nullptr) {
+    throw std::runtime_error(reader_.path().string() + ": no snapshot of " + runner.spec().name + " in the first " +
+                             std::to_string(*options_.from_s) + " s");
+  }
+  const auto state = decode<state_t>(reader_.at(last->offset).data);
+  runner.resume(state);
+  int64_t delay_us = 0;
+  for (const InputSpec& input : runner.spec().inputs) delay_us = std::max(delay_us, input.effect_delay_us);
+  beginnings_[stage] = {state.horizon_utime - delay_us, state.utime};
 }
 
 void Replayer::route(std::size_t stage) {
@@ -116,17 +155,21 @@ ReplaySummary Replayer::run() {
 
 /// All messages of one utime, stage by stage.
 void Replayer::dispatch(std::size_t begin, std::size_t end) {
-  const auto& copied = options_.copied_channels;
   for (std::size_t i = begin; i < end; ++i) {
     const IndexedMessage& message = index_.messages[i];
     const std::string& channel = index_.channels[static_cast<std::size_t>(message.channel)];
     const std::span<const uint8_t> data = reader_.at(message.offset).data;
-    if (std::find(copied.begin(), copied.end(), channel) != copied.end()) {
+    if (is_copied(channel)) {
       writes_.push_back({channel, message.header.seq, {data.begin(), data.end()}});
     }
     const auto found = routes_.find(channel);
-    if (found == routes_.end() || producers_.contains(channel)) continue;
-    for (const Route& route : found->second) inboxes_[route.stage].push_back({route.order, route.input, data, {}});
+    if (found == routes_.end()) continue;
+    const auto producer = producers_.find(channel);
+    if (producer != producers_.end() && utime_ > beginnings_[producer->second].outputs_after) continue;
+    for (const Route& route : found->second) {
+      if (utime_ <= beginnings_[route.stage].inputs_after) continue;
+      inboxes_[route.stage].push_back({route.order, route.input, data, {}});
+    }
   }
   for (std::size_t stage = 0; stage < runners_.size(); ++stage) {
     std::vector<Delivery>& inbox = inboxes_[stage];

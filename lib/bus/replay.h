@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "bus/log_reader.h"
@@ -16,6 +17,8 @@ struct ReplayOptions {
   /// Of the input log, copied to the output where they are there: what an evaluation needs beside the estimates.
   std::vector<std::string> copied_channels = {"CONFIG_DRIVE", "REFERENCE"};
   bool timing = false;
+  /// Begins each stage at its last recorded snapshot up to so many seconds into the log.
+  std::optional<double> from_s;
   std::function<void(double share)> progress;  ///< called now and then with what is done, 0 to 1
 };
 
@@ -34,8 +37,9 @@ struct ReplaySummary {
 };
 
 /// Stages in the order of their data: each reads outputs of earlier ones at once, of later ones (feedback) at the next
-/// utime. Input channels that one of the stages publishes are not taken from the log. Throws LogError, and
-/// std::runtime_error where a stage would have no clock.
+/// utime. Input channels that one of the stages publishes are not taken from the log, but for what it had published by
+/// the snapshot that it begins at. Throws LogError, and std::runtime_error where a stage would have no clock or no
+/// snapshot to begin at.
 ReplaySummary replay(const std::filesystem::path& in, const std::filesystem::path& out,
                      std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options = {});
 

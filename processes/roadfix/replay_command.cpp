@@ -6,6 +6,7 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "bus/replay.h"
 #include "roadfix/commands.h"
@@ -20,6 +21,7 @@ struct ReplayArguments {
   std::string out;
   std::string config;
   std::vector<std::string> stages;
+  std::optional<double> from_s;
   bool timing = false;
   bool progress = false;
 };
@@ -50,6 +52,7 @@ void run_replay(const ReplayArguments& arguments) {
   std::vector<std::unique_ptr<Stage>> stages = make_stages(arguments.stages, arguments.config);
   ReplayOptions options;
   options.timing = arguments.timing;
+  options.from_s = arguments.from_s;
   const bool progress = arguments.progress || ::isatty(STDERR_FILENO) != 0;
   if (progress) {
     options.progress = [](double share) {
@@ -72,6 +75,8 @@ void add_replay_command(CLI::App& app) {
   command->add_option("--stages", arguments->stages, "Stages, separated by commas")->required()->delimiter(',');
   command->add_option("--config", arguments->config, "The vehicle's configuration folder")->required();
   command->add_option("--out", arguments->out, "Log to write: the stages' outputs and the drive's facts")->required();
+  command->add_option("--from-s", arguments->from_s,
+                      "Begin each stage at its last snapshot in the first so many seconds");
   command->add_flag("--timing", arguments->timing, "Print how long each handler takes");
   command->add_flag("--progress", arguments->progress, "Print progress also where stderr is no terminal");
   command->callback([arguments] { run_replay(*arguments); });

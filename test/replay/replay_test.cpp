@@ -82,6 +82,31 @@ TEST_CASE("stage by stage gives what all stages at once give") {
   REQUIRE(events(folder / "all.lcm", "POSE_INS") == events(folder / "three.lcm", "POSE_INS"));
 }
 
+TEST_CASE("a replay begun at snapshots writes what the whole one writes from there on") {
+  TemporaryFolder folder;
+  write_drive(folder / "in.lcm", small_drive(40.0));
+  const std::vector<StageSpec> specs = {odometry_spec(), filter_spec(), fusion_spec()};
+  ReplayOptions options;
+  options.copied_channels = {"IMU", "GNSS", "WHEELS"};
+  replay(folder / "in.lcm", folder / "whole.lcm", stages(specs), options);
+  options.from_s = 25.0;
+  replay(folder / "whole.lcm", folder / "rest.lcm", stages(specs), options);
+  replay(folder / "whole.lcm", folder / "fusion.lcm", stages({fusion_spec()}), options);
+  for (const std::string channel : {"POSE_WHEEL", "POSE_INS", "POSE_FUSED", "STATE_FUSION"}) {
+    CAPTURE(channel);
+    const auto whole = events(folder / "whole.lcm", channel);
+    const auto rest = events(folder / "rest.lcm", channel);
+    REQUIRE(!rest.empty());
+    REQUIRE(rest.size() < whole.size());
+    REQUIRE(std::equal(rest.rbegin(), rest.rend(), whole.rbegin()));
+  }
+  REQUIRE(events(folder / "rest.lcm", "POSE_FUSED").size() > 1500);
+  REQUIRE(events(folder / "rest.lcm", "POSE_FUSED") == events(folder / "fusion.lcm", "POSE_FUSED"));
+  options.from_s = 0.5;
+  REQUIRE_THROWS_WITH(replay(folder / "whole.lcm", folder / "none.lcm", stages(specs), options),
+                      Catch::Contains("no snapshot of odometry"));
+}
+
 TEST_CASE("output events are in the order of utime, channel and seq, stamped with message time") {
   TemporaryFolder folder;
   write_drive(folder / "in.lcm", small_drive(5.0));
