@@ -68,6 +68,7 @@ void LogWriter::put(const void* data, std::size_t size) {
   const auto* begin = static_cast<const uint8_t*>(data);
   buffer_.insert(buffer_.end(), begin, begin + size);
   bytes_ += size;
+  hash_.add(data, size);
 }
 
 void LogWriter::flush(bool to_disk) {

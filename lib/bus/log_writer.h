@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bus/log_file.h"
+#include "stream/stream_hash.h"
 
 namespace roadfix {
 
@@ -32,6 +33,8 @@ class LogWriter {
 
   [[nodiscard]] int64_t events() const { return events_; }
   [[nodiscard]] uint64_t bytes() const { return bytes_; }
+  /// Of all bytes so far, as `xxhsum` computes it.
+  [[nodiscard]] uint64_t hash() const { return hash_.value(); }
 
  private:
   void put(const void* data, std::size_t size);
@@ -43,6 +46,7 @@ class LogWriter {
   std::vector<uint8_t> buffer_;
   int64_t events_ = 0;
   uint64_t bytes_ = 0;
+  StreamHash hash_;
 };
 
 }  // namespace roadfix

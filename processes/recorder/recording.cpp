@@ -44,6 +44,7 @@ void Recording::open_next() {
 void Recording::finish_file() {
   if (!log_) return;
   facts_.back().bytes = log_->bytes();
+  facts_.back().hash = log_->hash();
   const std::unique_ptr<LogWriter> closing = std::move(log_);
   closing->commit();
 }
@@ -149,7 +150,7 @@ void Recording::write_sidecar() const {
   sidecar.stopped_because = reason_;
   sidecar.dropped = dropped_;
   sidecar.unwritten = unwritten_;
-  for (const FileFacts& f : facts_) sidecar.files.push_back({f.name, f.first_us, f.last_us, f.bytes, f.events});
+  for (const FileFacts& f : facts_) sidecar.files.push_back({f.name, f.first_us, f.last_us, f.bytes, f.hash, f.events});
   roadfix::write_sidecar(folder_ / (name_ + ".json"), sidecar);
 }
 

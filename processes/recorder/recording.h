@@ -58,6 +58,7 @@ class Recording {
     int64_t last_us = 0;
     std::map<std::string, int64_t> events;
     uint64_t bytes = 0;
+    uint64_t hash = 0;
   };
 
   void open_next();

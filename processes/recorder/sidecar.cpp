@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "bus/process_facts.h"
 #include "bus/schema.h"
 #include "type_text.h"
 
@@ -24,10 +25,13 @@ void write_sidecar(const std::filesystem::path& path, const Sidecar& sidecar) {
                              {"first_utime", file.first_us},
                              {"last_utime", file.last_us},
                              {"bytes", file.bytes},
+                             {"xxh64", fmt::format("{:016x}", file.hash)},
                              {"events", file.events}});
   json["versions"] = {{"lcm", fmt::format("{}.{}.{}", LCM_MAJOR_VERSION, LCM_MINOR_VERSION, LCM_MICRO_VERSION)},
                       {"eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
-                      {"compiler", __VERSION__}};
+                      {"compiler", __VERSION__},
+                      {"computing", library_versions()},
+                      {"build", build_id()}};
   utsname host{};
   if (uname(&host) == 0) json["host"] = {{"name", host.nodename}, {"kernel", host.release}, {"machine", host.machine}};
   for (const TypeText& type : type_texts())

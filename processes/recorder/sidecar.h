@@ -15,6 +15,7 @@ struct SidecarFile {
   int64_t first_us = 0;
   int64_t last_us = 0;
   uint64_t bytes = 0;
+  uint64_t hash = 0;                      ///< XXH64; 0 while it is being written
   std::map<std::string, int64_t> events;  ///< per channel
 };
 

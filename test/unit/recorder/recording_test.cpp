@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 
 #include "bus/log_reader.h"
@@ -63,6 +64,17 @@ TEST_CASE("a recording splits by size and by time and loses nothing") {
   const nlohmann::json facts = sidecar(folder.path() / "20260101T000000Z.json");
   CHECK(facts["files"].size() == recording.files().size());
   CHECK(facts["files"][0]["events"]["CAMERA_LEFT"] == 10);
+  for (const nlohmann::json& file : facts["files"]) {
+    std::ifstream stream(folder.path() / file["name"].get<std::string>(), std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+    CHECK(file["bytes"] == bytes.size());
+    StreamHash hash;
+    hash.add(bytes.data(), bytes.size());
+    std::ostringstream hex;
+    hex << std::hex << std::setw(16) << std::setfill('0') << hash.value();
+    CHECK(file["xxh64"] == hex.str());
+  }
+  CHECK_FALSE(facts["versions"]["build"].get<std::string>().empty());
   CHECK(facts["types"].size() >= 20);
   CHECK(facts["types"][0]["fingerprint"].get<std::string>().size() == 16);
   CHECK(facts["stopped_because"] == "");
