@@ -52,7 +52,7 @@ Finding check_clock() {
   timex state{};
   const int status = adjtimex(&state);
   const char* mend = "apt-get install chrony && chronyc waitsync";
-  if (status == -1) return {Level::kWarning, "clock", "the kernel does not tell its state", ""};
+  if (status == -1) return {Level::kWarning, "clock", "the kernel does not tell its state", mend};
   if (status == TIME_ERROR || (state.status & STA_UNSYNC) != 0)
     return {Level::kWarning, "clock", "not synchronised: recordings of several machines will not fit together", mend};
   return {
@@ -72,7 +72,8 @@ Finding check_disk(const std::filesystem::path& folder, std::uint64_t wanted_byt
   if (space.available >= wanted_bytes) return {Level::kOk, "disk", seen, ""};
   return {Level::kWarning, "disk",
           fmt::format("{} (wanted {:.1f} GiB)", seen, static_cast<double>(wanted_bytes) / kGibi),
-          "rm old recordings, or record elsewhere"};
+          fmt::format("ls -tr {}/*.lcm | head   # the oldest recordings: delete some, or record elsewhere",
+                      folder.string())};
 }
 
 Level print_findings(const std::vector<Finding>& findings, std::ostream& out) {

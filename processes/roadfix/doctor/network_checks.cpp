@@ -131,7 +131,8 @@ std::vector<Finding> check_reassembly(const std::filesystem::path& root, const B
 Finding check_ttl(const BusUrl& url) {
   if (url.ttl == 0) return {Level::kOk, "ttl", "0: nothing leaves this machine", ""};
   return {Level::kWarning, "ttl",
-          fmt::format("{}: every message goes out to the network, and anyone there can send", url.ttl), ""};
+          fmt::format("{}: every message goes out to the network, and anyone there can send", url.ttl),
+          fmt::format("export LCM_DEFAULT_URL='udpm://{}:{}?ttl=0'   # unless it is meant so", url.group, url.port)};
 }
 
 Finding check_loopback(const std::string& url) {

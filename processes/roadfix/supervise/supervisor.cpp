@@ -102,7 +102,7 @@ void Supervisor::died(Child& child, int status) {
   wait = std::min(wait, config_.backoff_max);
   child.due = now + seconds(wait);
   ++restarts_;
-  say_(fmt::format("{} {}; starts again in {:.1f} s", child.name, how_it_ended(status), wait));
+  say_(fmt::format("{} {}; starts again in {:.2f} s", child.name, how_it_ended(status), wait));
 }
 
 void Supervisor::reap() {

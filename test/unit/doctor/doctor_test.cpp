@@ -90,6 +90,24 @@ TEST_CASE("missing Java and types are said with the package that brings them") {
   CHECK(findings[2].level == Level::kWarning);
 }
 
+TEST_CASE("whatever is wrong, a command that mends it is said") {
+  const MadeRoot root;
+  root.write("proc/net/route", kHeading);
+  root.write("proc/sys/net/ipv4/ipfrag_time", "30\n");
+  BusUrl url;
+  url.ttl = 1;
+  std::vector<Finding> all = {check_route(root.path(), url), check_ttl(url), check_disk("/", UINT64_MAX),
+                              check_disk("/no/such/folder", 1), check_clock()};
+  for (const std::vector<Finding>& more : {check_buffers(root.path()), check_reassembly(root.path(), url),
+                                           check_spy("/bin", root.path(), root.path() / "types.jar")})
+    all.insert(all.end(), more.begin(), more.end());
+  CHECK(std::count_if(all.begin(), all.end(), [](const Finding& f) { return f.level != Level::kOk; }) >= 11);
+  for (const Finding& finding : all) {
+    CAPTURE(finding.check, finding.seen);
+    CHECK((finding.level == Level::kOk) == finding.mend.empty());
+  }
+}
+
 TEST_CASE("the disk check compares with what a drive wants") {
   CHECK(check_disk("/", 1).level == Level::kOk);
   CHECK(check_disk("/", UINT64_MAX).level == Level::kWarning);
