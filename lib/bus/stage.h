@@ -26,9 +26,10 @@ struct OutputSpec {
   std::string type;
 };
 
+/// A stage that asks for a snapshot gets it, whatever this says.
 enum class Snapshots {
-  kPeriodic,  ///< every 9 s of data
-  kOnRequest  ///< when the stage wants one
+  kPeriodic,  ///< every 9 s of data as well
+  kOnRequest  ///< no others
 };
 
 struct StageSpec {
@@ -100,7 +101,7 @@ class Stage {
   [[nodiscard]] virtual std::vector<uint8_t> save() const = 0;
   virtual void load(std::span<const uint8_t> state) = 0;
 
-  /// Asked after each publish(), and only where the spec says so: whether save() now is worth its size.
+  /// Asked after each publish(): whether a snapshot now, beside the periodic ones, is worth its size.
   [[nodiscard]] virtual bool wants_snapshot() const { return false; }
 
   /// What the next start of the process may begin with (bus/stage_memory.h). Empty: nothing worth keeping yet.

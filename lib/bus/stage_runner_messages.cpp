@@ -51,15 +51,13 @@ void StageRunner::publish_ledger() {
 
 /// After the outputs of its tick, so that the state holds what publishing them has changed.
 void StageRunner::publish_state_if_due() {
-  if (spec().snapshots == Snapshots::kOnRequest) {
-    if (stage_->wants_snapshot()) publish_state();
-    return;
+  bool due = stage_->wants_snapshot();
+  if (spec().snapshots == Snapshots::kPeriodic) {
+    const int64_t slot = now_utime_ / kSnapshot_us;
+    if (state_slot_ && state_slot_ != slot) due = true;  // a start has nothing worth keeping
+    state_slot_ = slot;
   }
-  const int64_t slot = now_utime_ / kSnapshot_us;
-  if (state_slot_ == slot) return;
-  const bool first = !state_slot_;
-  state_slot_ = slot;
-  if (!first) publish_state();  // a start has nothing worth keeping
+  if (due) publish_state();
 }
 
 void StageRunner::publish_state() {

@@ -35,6 +35,7 @@ void KeyframeTracker::begin_map(int64_t t_us) {
     out_.closed_reset_delta = out_.reset_delta;
   }
   motion_.reset();
+  out_.map_began = true;
   out_.state = found_back_ ? TrackState::kRelocalised : TrackState::kGood;
   out_.reason = found_back_ ? "found back at a place seen before" : "";
   found_back_ = false;

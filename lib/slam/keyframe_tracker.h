@@ -43,7 +43,8 @@ struct UsedFeature {
 struct TrackedFrame {
   Odometry odometry;  ///< frame local; invalid unless the state is good, weak or relocalised
   TrackState state = TrackState::kInitialising;
-  std::string reason;  ///< plain words, empty when good
+  bool map_began = false;  ///< at this frame
+  std::string reason;      ///< plain words, empty when good
   ScaleSource scale = ScaleSource::kNone;
   double scale_std = 0.0;                  ///< relative, common to the whole way; meaningless where the source is none
   int reset_counter = 0;                   ///< +1 per jump of the pose

@@ -40,8 +40,12 @@ struct JumpCount {
 
 class ImmFusionStage final : public Stage {
  public:
-  explicit ImmFusionStage(const ImmFusionConfig& config)
-      : config_(config), fusion_(config.fusion), pose_slot_(config.publish_period), state_slot_(config.state_period) {
+  ImmFusionStage(std::string calibration, const ImmFusionConfig& config)
+      : config_(config),
+        calibration_(std::move(calibration)),
+        fusion_(config.fusion),
+        pose_slot_(config.publish_period),
+        state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0},
                     {"POSE_INS", "pose_t", 0, 0},
@@ -120,7 +124,7 @@ class ImmFusionStage final : public Stage {
 
   void load(std::span<const uint8_t> state) override {
     StateReader reader(state);
-    ImmFusionStage loaded(config_);
+    ImmFusionStage loaded(calibration_, config_);
     for (PublishSlot* slot : {&loaded.pose_slot_, &loaded.state_slot_}) slot->set_last(reader.get<int64_t>());
     for (JumpCount& c : loaded.counts_) {
       reader.get(c.run);
@@ -140,6 +144,7 @@ class ImmFusionStage final : public Stage {
   }
 
   [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+  [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
   void fuse(FusionChannel channel, const pose_t& message) {
@@ -174,6 +179,7 @@ class ImmFusionStage final : public Stage {
   }
 
   ImmFusionConfig config_;
+  std::string calibration_;  ///< told, not used: the poses are the vehicle's already
   StageSpec spec_;
   Fusion fusion_;  ///< at the horizon
   Outlook outlook_;
@@ -187,12 +193,13 @@ class ImmFusionStage final : public Stage {
 
 }  // namespace
 
-std::unique_ptr<Stage> make_imm_fusion(const ImmFusionConfig& config) {
-  return std::make_unique<ImmFusionStage>(config);
+std::unique_ptr<Stage> make_imm_fusion(const Calibration& calibration, const ImmFusionConfig& config) {
+  return std::make_unique<ImmFusionStage>(calibration_text(calibration), config);
 }
 
 std::unique_ptr<Stage> make_imm_fusion(const std::filesystem::path& vehicle_dir) {
-  return make_imm_fusion(load_config_or_defaults<ImmFusionConfig>(vehicle_dir / "imm_fusion.yaml"));
+  return make_imm_fusion(load_calibration(vehicle_dir),
+                         load_config_or_defaults<ImmFusionConfig>(vehicle_dir / "imm_fusion.yaml"));
 }
 
 }  // namespace roadfix

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "bus/stage.h"
+#include "config/calibration.h"
 #include "fusion/fusion_config.h"
 
 namespace roadfix {
@@ -24,7 +25,7 @@ void visit(ImmFusionConfig& c, Visitor& v) {
   v.group("fusion", c.fusion);
 }
 
-std::unique_ptr<Stage> make_imm_fusion(const ImmFusionConfig& config);
+std::unique_ptr<Stage> make_imm_fusion(const Calibration& calibration, const ImmFusionConfig& config);
 std::unique_ptr<Stage> make_imm_fusion(const std::filesystem::path& vehicle_dir);
 
 }  // namespace roadfix

@@ -96,6 +96,7 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   outputs.publish(kPose, pose);
   pose_t closed = vo_closed_pose(frame, tracker_->closed(odometry), origin);
   outputs.publish(kClosed, closed);
+  map_began_ = tracked_ && frame.map_began;
   if (!tracked_) return;  // a tick without a left picture: nothing new to say but the pose carried on
   tracked_ = false;
   vo_status_t status = vo_status(frame, config_.keyframe.front_end.kind);
@@ -125,7 +126,7 @@ void KeyframeStage::load(std::span<const uint8_t> state) {
   tracker_ = std::move(loaded);
   stamps_ = stamps;
   left_.reset();
-  tracked_ = false;
+  tracked_ = map_began_ = false;
 }
 
 std::string KeyframeStage::effective_config() const { return config_text(config_); }

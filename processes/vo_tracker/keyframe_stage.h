@@ -29,6 +29,8 @@ class KeyframeStage final : public Stage {
   void digest(Digest& digest) const override;
   [[nodiscard]] std::vector<uint8_t> save() const override;
   void load(std::span<const uint8_t> state) override;
+  /// Each map's beginning: what led to it need not be computed again.
+  [[nodiscard]] bool wants_snapshot() const override { return map_began_; }
   [[nodiscard]] std::string effective_config() const override;
   [[nodiscard]] std::string effective_calibration() const override;
 
@@ -45,7 +47,8 @@ class KeyframeStage final : public Stage {
   std::unique_ptr<KeyframeTracker> tracker_;
   std::unique_ptr<CameraFrame> left_;  ///< waits for its right picture until the tick's end
   StampFilter stamps_;
-  bool tracked_ = false;  ///< a frame since the last publish
+  bool tracked_ = false;    ///< a frame since the last publish
+  bool map_began_ = false;  ///< with the frame of the last publish
 };
 
 }  // namespace roadfix

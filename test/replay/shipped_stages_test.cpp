@@ -1,78 +1,23 @@
-// The stages that a car runs, on the demo drive: neither the order of arrival, nor duplicates, nor threads beside it
-// show in a single byte.
+// The stages that a car runs: neither the order of arrival, nor duplicates, nor threads beside it show in a single
+// byte; and what verify says of each.
+#include "replay/shipped_stages.h"
+
 #include <catch2/catch.hpp>
-#include <random>
+#include <set>
 #include <thread>
 
-#include "bus/log_reader.h"
 #include "bus/stage_memory.h"
 #include "bus/stage_runner.h"
+#include "bus/verify.h"
 #include "roadfix/stages.h"
-#include "support/shared_data.h"
+#include "support/temporary_folder.h"
 
 using namespace roadfix;
+using namespace roadfix::test;
 
 namespace {
 
-constexpr double kSeconds = 20.0;
-
-struct LoggedMessage {
-  std::string channel;
-  Header header;
-  std::vector<uint8_t> bytes;
-};
-
-/// The beginning of the demo drive.
-const std::vector<LoggedMessage>& demo() {
-  static const std::vector<LoggedMessage> kDemo = [] {
-    LogReader reader(test::source_path("logs/demo.lcm"));
-    std::vector<LoggedMessage> all;
-    while (const auto event = reader.next()) {
-      const Header header = *read_header(event->data);
-      all.push_back({std::string(event->channel), header, {event->data.begin(), event->data.end()}});
-    }
-    int64_t first = all.front().header.utime;
-    for (const LoggedMessage& message : all) first = std::min(first, message.header.utime);
-    std::erase_if(all, [&](const LoggedMessage& message) {
-      return message.header.utime - first > static_cast<int64_t>(kSeconds * 1e6);
-    });
-    return all;
-  }();
-  return kDemo;
-}
-
-struct Delivery {
-  int64_t arrives = 0;
-  int order = 0;
-  int input = 0;
-  const LoggedMessage* message = nullptr;
-};
-
-/// The stage's inputs as they arrive: the first clock in its own order, the others less than their lateness behind, and
-/// every third twice where duplicates are wanted. Without a seed, nothing is late.
-std::vector<Delivery> deliveries(const StageSpec& spec, std::optional<unsigned> seed, bool duplicates,
-                                 int64_t extra_us = 0) {
-  std::mt19937_64 random(seed.value_or(0));
-  std::vector<Delivery> all;
-  for (const LoggedMessage& message : demo()) {
-    for (int input = 0; input < static_cast<int>(spec.inputs.size()); ++input) {
-      const InputSpec& declared = spec.inputs[static_cast<std::size_t>(input)];
-      if (declared.channel != message.channel) continue;
-      const int64_t window = input == spec.clocks.front().input ? 0 : declared.lateness_us;
-      const int64_t delay = seed && window > 0 ? static_cast<int64_t>(random() % static_cast<uint64_t>(window)) : 0;
-      const int64_t arrives = message.header.utime + delay + (window > 0 ? extra_us : 0);
-      all.push_back({arrives, delivery_order(spec, input), input, &message});
-      if (duplicates && message.header.seq % 3 == 0) {
-        const auto later = static_cast<int64_t>(random() % 400'000);
-        all.push_back({arrives + later, delivery_order(spec, input), input, &message});
-      }
-    }
-  }
-  std::stable_sort(all.begin(), all.end(), [](const Delivery& a, const Delivery& b) {
-    return std::tie(a.arrives, a.order) < std::tie(b.arrives, b.order);
-  });
-  return all;
-}
+constexpr unsigned kOrders = 200;
 
 /// Every output and snapshot, byte for byte, one behind the other. A snapshot tells what has arrived and waits, too.
 struct Published : MessageSink {
@@ -87,47 +32,67 @@ struct Published : MessageSink {
   }
 };
 
-Published run(const std::string& stage, const std::vector<Delivery>& all) {
+Published run(const ShippedStage& stage, const Arrivals& arrivals) {
   Published published;
-  StageRunner runner(std::move(make_stages({stage}, test::source_path("configs/demo")).front()), published);
-  for (const Delivery& delivery : all) runner.offer(delivery.input, delivery.message->bytes);
+  StageRunner runner(stage.made(), published);
+  for (const Delivery& d : deliveries(runner.spec(), stage.drive(), arrivals)) runner.offer(d.input, d.message->bytes);
   return published;
 }
 
-StageSpec spec_of(const std::string& stage) {
-  return make_stages({stage}, test::source_path("configs/demo")).front()->spec();
+/// With a stage of another calibration, where one is given.
+StageVerdict verdict(const ShippedStage& stage, std::span<const LoggedEvent> events,
+                     const std::optional<Calibration>& here = std::nullopt) {
+  const TemporaryFolder folder;
+  write_events(folder / "drive.lcm", events);
+  return verify({folder / "drive.lcm"}, {[&] { return stage.make(here.value_or(stage.calibration)); }}).stages.at(0);
 }
 
-/// Those that the demo drive's sensors suffice for.
-const std::vector<std::string> kDemoStages = {"gnss_ins_ekf", "wheel_odometry"};
+void require_orders_alike(const ShippedStage& stage) {
+  const Published expected = run(stage, {});
+  REQUIRE(expected.messages > 50);
+  REQUIRE(!expected.states.empty());
+  for (unsigned seed = 1; seed <= kOrders; ++seed) {
+    CAPTURE(stage.title, seed);
+    REQUIRE(run(stage, {.seed = seed, .duplicates = seed % 2 == 0}).outputs == expected.outputs);
+  }
+  // The comparison can fail: beyond the lateness inputs are refused, and that shows.
+  REQUIRE(run(stage, {.seed = 1, .extra_us = 300'000}).outputs != expected.outputs);
+}
 
 }  // namespace
 
-TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: the same bytes") {
-  for (const std::string& stage : kDemoStages) {
-    CAPTURE(stage);
-    const StageSpec spec = spec_of(stage);
-    const Published expected = run(stage, deliveries(spec, std::nullopt, false));
-    REQUIRE(expected.messages > 500);
-    REQUIRE(!expected.states.empty());
-    for (unsigned seed = 1; seed <= 200; ++seed) {
-      CAPTURE(seed);
-      const Published shuffled = run(stage, deliveries(spec, seed, seed % 2 == 0));
-      REQUIRE(shuffled.outputs == expected.outputs);
-    }
-    // The comparison can fail: beyond the lateness inputs are refused, and that shows.
-    REQUIRE(run(stage, deliveries(spec, 1, false, 300'000)).outputs != expected.outputs);
-  }
+TEST_CASE("every stage of the program is among the shipped ones of these tests") {
+  std::set<std::string> tested;
+  for (const ShippedStage& stage : shipped_stages()) tested.insert(stage.made()->spec().name);
+  for (const std::string& name : stage_names()) REQUIRE(tested.contains(name));
+}
+
+// Each a test of its own, so that they run beside each other.
+TEST_CASE(
+    "200 orders of arrival within the lateness, half of them with duplicates: gnss_ins_ekf gives the same bytes") {
+  require_orders_alike(shipped_stages()[0]);
+}
+TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: wheel_odometry does") {
+  require_orders_alike(shipped_stages()[1]);
+}
+TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: imm_fusion does") {
+  require_orders_alike(shipped_stages()[2]);
+}
+TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: vo_tracker does") {
+  require_orders_alike(shipped_stages()[3]);
+}
+TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: vo_tracker in mode msckf does") {
+  require_orders_alike(shipped_stages()[4]);
 }
 
 TEST_CASE("four stages beside each other in threads: the same bytes as alone") {
-  for (const std::string& stage : kDemoStages) {
-    CAPTURE(stage);
-    const std::vector<Delivery> all = deliveries(spec_of(stage), 5, false);
-    const Published alone = run(stage, all);
+  for (const ShippedStage& stage : shipped_stages()) {
+    CAPTURE(stage.title);
+    const Arrivals arrivals{.seed = 5};
+    const Published alone = run(stage, arrivals);
     std::vector<Published> beside(4);
     std::vector<std::thread> threads;
-    for (Published& published : beside) threads.emplace_back([&] { published = run(stage, all); });
+    for (Published& published : beside) threads.emplace_back([&] { published = run(stage, arrivals); });
     for (std::thread& thread : threads) thread.join();
     for (const Published& published : beside) {
       REQUIRE(published.outputs == alone.outputs);
@@ -136,14 +101,53 @@ TEST_CASE("four stages beside each other in threads: the same bytes as alone") {
   }
 }
 
+TEST_CASE("each stage verifies, and one value of the calibration changed is named") {
+  for (const ShippedStage& stage : shipped_stages()) {
+    CAPTURE(stage.title);
+    const std::vector<LoggedEvent> log = record(stage);
+    const StageVerdict same = verdict(stage, log);
+    REQUIRE(same.identical() > 50);
+    REQUIRE(same.differing() + same.unverifiable() == 0);
+    REQUIRE(same.config_differences.empty());
+    Calibration changed = stage.calibration;
+    changed.sensors.imu->gyro_noise = 0.0123;
+    const StageVerdict other = verdict(stage, log, changed);
+    REQUIRE(other.config_differences.size() == 1);
+    REQUIRE_THAT(other.config_differences[0],
+                 Catch::Contains("calibration: ") && Catch::Contains("gyro_noise_radps_per_rthz: 0.0123' here"));
+  }
+}
+
+TEST_CASE("a recording of each stage begun in mid-drive: nothing differs from the first snapshot on") {
+  for (const ShippedStage& stage : shipped_stages()) {
+    CAPTURE(stage.title);
+    const std::vector<LoggedEvent> log = record(stage);
+    const std::span<const LoggedEvent> late = std::span(log).subspan(log.size() / 20);
+    const StageVerdict rest = verdict(stage, late);
+    REQUIRE(rest.differing() == 0);
+    REQUIRE(rest.identical() > 20);
+    REQUIRE(rest.runs.at(0).resumed >= 1);
+  }
+}
+
+TEST_CASE("the tracker publishes a snapshot where a map begins, also after a wish to start again") {
+  const ShippedStage& tracker = shipped_stages()[3];
+  std::vector<int64_t> snapshots;
+  for (const LoggedEvent& event : record(tracker)) {
+    if (event.channel == "STATE_VO_TRACKER") snapshots.push_back(event.header.utime - kDriveStart_us);
+  }
+  // The first pictures; the 9 s of data; the first frame half a second after the wish of 1.15 s.
+  REQUIRE(snapshots == std::vector<int64_t>{0, 1'000'000, 1'700'000});
+}
+
 namespace {
 
-/// What a stage remembers after the demo drive, where it began with `memory` (empty: with none).
-std::vector<uint8_t> remembered(const std::string& stage, const std::vector<uint8_t>& memory) {
+/// What a stage remembers after its drive, where it began with `memory` (empty: with none).
+std::vector<uint8_t> remembered(const ShippedStage& stage, const std::vector<uint8_t>& memory) {
   Published published;
-  StageRunner runner(std::move(make_stages({stage}, test::source_path("configs/demo")).front()), published);
+  StageRunner runner(stage.made(), published);
   const StageSpec& spec = runner.spec();
-  const std::vector<Delivery> all = deliveries(spec, std::nullopt, false);
+  const std::vector<Delivery> all = deliveries(spec, stage.drive());
   if (!memory.empty()) {
     state_t start{};
     start.utime = all.front().message->header.utime - 250'000;
@@ -163,9 +167,12 @@ std::vector<uint8_t> remembered(const std::string& stage, const std::vector<uint
 }  // namespace
 
 TEST_CASE("what a shipped stage remembers comes back through its START input") {
-  for (const std::string& stage : kDemoStages) {
-    CAPTURE(stage);
+  int with_memory = 0;
+  for (const ShippedStage& stage : shipped_stages()) {
+    CAPTURE(stage.title);
     std::vector<uint8_t> memory = remembered(stage, {});
+    if (memory_input(stage.made()->spec()) < 0) continue;
+    ++with_memory;
     REQUIRE(!memory.empty());
     const std::vector<uint8_t> cold = memory;
     REQUIRE(remembered(stage, memory) != cold);
@@ -173,4 +180,5 @@ TEST_CASE("what a shipped stage remembers comes back through its START input") {
     memory.push_back(0);
     REQUIRE(remembered(stage, memory) == cold);
   }
+  REQUIRE(with_memory == 2);
 }

@@ -102,7 +102,7 @@ void offer(StageRunner& runner, const Arrival& a) {
 
 Caught run(const std::vector<Arrival>& messages) {
   Caught sink;
-  StageRunner runner(make_imm_fusion(ImmFusionConfig{}), sink);
+  StageRunner runner(make_imm_fusion(Calibration{}, ImmFusionConfig{}), sink);
   for (const Arrival& a : messages) offer(runner, a);
   return sink;
 }
@@ -231,7 +231,7 @@ TEST_CASE("a stage that begins at a snapshot publishes what the one that never s
   REQUIRE(states.size() >= 5);
   for (const state_t& state : {states[1], states[4]}) {
     Caught rest;
-    StageRunner resumed(make_imm_fusion(ImmFusionConfig{}), rest);
+    StageRunner resumed(make_imm_fusion(Calibration{}, ImmFusionConfig{}), rest);
     resumed.resume(state);
     for (const Arrival& a : messages)
       if (a.header.utime > state.horizon_utime) offer(resumed, a);
@@ -245,7 +245,7 @@ TEST_CASE("a stage that begins at a snapshot publishes what the one that never s
     }
   }
   Caught ignored;
-  StageRunner other(make_imm_fusion(ImmFusionConfig{}), ignored);
+  StageRunner other(make_imm_fusion(Calibration{}, ImmFusionConfig{}), ignored);
   state_t cut = states[1];
   cut.state.resize(cut.state.size() - 1);
   CHECK_THROWS(other.resume(cut));
