@@ -81,6 +81,8 @@ if [[ $trouble == ip_loss ]]; then
   echo "dropped on the way: $("${there[@]}" nft list chain ip loss in | grep -o 'packets [0-9]*')"
 elif [[ $trouble == silent_clock ]]; then
   grep -q '^filter: [1-9][0-9]* heartbeats without a clock' "$folder/verdict" || fail 'nobody said that the clock was silent'
+elif [[ $trouble == starved ]]; then
+  grep -q '^filter: [1-9][0-9]* datagrams dropped by the kernel' "$folder/verdict" || fail 'nobody said what the kernel dropped'
 elif [[ $trouble == clean ]]; then
   ! grep -q 'without a clock' "$folder/verdict" || fail 'the clock was called silent'
 fi

@@ -1,4 +1,5 @@
 // verify over the live tests' stages: verify_chain LOG...; prints one line "identical N differing N unverifiable N".
+#include <algorithm>
 #include <iostream>
 #include <roadfix/heartbeat_t.hpp>
 
@@ -8,13 +9,15 @@
 
 namespace {
 
-/// Per stage, where there are any between two outputs: "filter: 2 heartbeats without a clock".
-void tell_silences(const std::vector<std::filesystem::path>& logs) {
+/// What the stages' heartbeats say: "filter: 2 heartbeats without a clock" (those between two outputs), "filter: 7
+/// datagrams dropped by the kernel"; nothing where there are none.
+void tell_heartbeats(const std::vector<std::filesystem::path>& logs) {
   using namespace roadfix;
   for (const StageSpec& spec : {test::odometry_spec(), test::filter_spec(), test::fusion_spec()}) {
     int64_t silent = 0;
     int64_t since_output = 0;
     bool ticked = false;
+    int64_t kernel_drops = 0;
     for (const std::filesystem::path& log : logs) {
       LogReader reader(log);
       while (const auto event = reader.next()) {
@@ -23,11 +26,14 @@ void tell_silences(const std::vector<std::filesystem::path>& logs) {
           since_output = 0;
           ticked = true;
         } else if (event->channel == stage_channel("HEARTBEAT_", spec.name)) {
-          since_output += decode<heartbeat_t>(event->data).state == heartbeat_t::STATE_NO_CLOCK ? 1 : 0;
+          const auto heartbeat = decode<heartbeat_t>(event->data);
+          since_output += heartbeat.state == heartbeat_t::STATE_NO_CLOCK ? 1 : 0;
+          kernel_drops = std::max(kernel_drops, heartbeat.kernel_drops);
         }
       }
     }
     if (silent > 0) std::cout << spec.name << ": " << silent << " heartbeats without a clock\n";
+    if (kernel_drops > 0) std::cout << spec.name << ": " << kernel_drops << " datagrams dropped by the kernel\n";
   }
 }
 
@@ -36,7 +42,7 @@ void tell_silences(const std::vector<std::filesystem::path>& logs) {
 int main(int argc, char** argv) {
   using namespace roadfix;
   std::vector<std::filesystem::path> logs(argv + 1, argv + argc);
-  tell_silences(logs);
+  tell_heartbeats(logs);
   std::vector<NewStage> stages;
   for (const StageSpec& spec : {test::odometry_spec(), test::filter_spec(), test::fusion_spec()}) {
     stages.push_back([spec] { return std::make_unique<test::ChainStage>(spec); });

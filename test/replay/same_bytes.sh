@@ -13,7 +13,8 @@ if [[ $config == made ]]; then
   config=$folder/vehicle; log=$folder/drive.lcm
   [[ -z ${6:-} ]] || echo "$6" >"$config/vo_tracker.yaml"
 fi
-replay() { "$roadfix" replay "$log" --stages "$stages" --config "${2:-$config}" --out "$folder/$1.lcm" >/dev/null; }
+stage=${stages%%,*}
+replay() { "$roadfix" replay "$log" --stages "${3:-$stages}" --config "${2:-$config}" --out "$folder/$1.lcm" >/dev/null; }
 replay normal
 OPENCV_CPU_DISABLE=AVX2,FMA3 replay narrow
 taskset -c 0 env OMP_NUM_THREADS=1 "$roadfix" replay "$log" --stages "$stages" --config "$config" --out "$folder/alone.lcm" >/dev/null
@@ -23,4 +24,8 @@ replay changed "$folder/changed"
 [[ $(stat -c %s "$folder/normal.lcm") -gt 100000 ]] || { echo 'too little was replayed'; exit 1; }
 for other in narrow alone; do cmp "$folder/normal.lcm" "$folder/$other.lcm" || { echo "$other: other bytes"; exit 1; }; done
 ! cmp -s "$folder/normal.lcm" "$folder/changed.lcm" || { echo 'the comparison cannot fail'; exit 1; }
+# The process over a log is the same handler.
+replay tool "$config" "$stage"
+"$(dirname "$roadfix")/$stage" --config "$config" --log-in "$log" --log-out "$folder/process.lcm"
+cmp "$folder/tool.lcm" "$folder/process.lcm" || { echo "$stage over a log: other bytes than in replay"; exit 1; }
 echo "$(stat -c %s "$folder/normal.lcm") bytes, three times the same"
