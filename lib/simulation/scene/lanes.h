@@ -50,8 +50,9 @@ inline F8 root(F8 x) {
 inline F8 mix(F8 a, F8 b, F8 share) { return a + (b - a) * share; }
 inline F8 to_float(I8 x) { return __builtin_convertvector(x, F8); }
 inline I8 to_int(F8 x) { return __builtin_convertvector(x, I8); }
-/// Wraps around: lanes whose ray hit nothing carry any number and must not overflow.
+/// Both wrap around: lanes whose ray hit nothing carry any number and must not overflow.
 inline I8 add_wrapping(I8 a, I8 b) { return (I8)((U8)a + (U8)b); }
+inline I8 multiply_wrapping(I8 a, I8 b) { return (I8)((U8)a * (U8)b); }
 /// For |x| < 2^31; a comparison gives -1 where it holds, which is the correction of the truncation.
 inline I8 floor_int(F8 x) {
   const I8 truncated = to_int(x);

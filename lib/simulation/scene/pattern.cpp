@@ -14,7 +14,8 @@ Cell cell_of(const SurfaceLanes& p) {
   const I8 ix = floor_int(p.s / p.pattern_s);
   const I8 iy = floor_int(p.t / p.pattern_t);
   return {p.s - to_float(ix) * p.pattern_s, p.t - to_float(iy) * p.pattern_t,
-          hash_cell(ix + p.block_s * 4096, iy + p.block_t * 4096, p.key)};
+          hash_cell(add_wrapping(ix, multiply_wrapping(p.block_s, I8{} + 4096)),
+                    add_wrapping(iy, multiply_wrapping(p.block_t, I8{} + 4096)), p.key)};
 }
 
 /// A worn line: white where it is not rubbed off.

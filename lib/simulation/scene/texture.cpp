@@ -95,8 +95,8 @@ Cells cells_of(const SurfaceLanes& p, const LayerLanes& layer) {
   const I8 ix = floor_int(x);
   const I8 iy = floor_int(y);
   constexpr auto kBlock = static_cast<float>(kTextureBlock_m);
-  c.x = ix + p.block_s * to_int(kBlock * layer.per_s);
-  c.y = iy + p.block_t * to_int(kBlock * layer.per_t);
+  c.x = add_wrapping(ix, multiply_wrapping(p.block_s, to_int(kBlock * layer.per_s)));
+  c.y = add_wrapping(iy, multiply_wrapping(p.block_t, to_int(kBlock * layer.per_t)));
   c.fx = x - to_float(ix);
   c.fy = y - to_float(iy);
   c.wx = p.width_s * layer.per_s;
@@ -110,8 +110,10 @@ F8 smooth_noise(const Cells& c, U8 key) {
   if (!any(keep > 0.0F)) return splat(0.0F);
   const F8 ease_x = c.fx * c.fx * (3.0F - 2.0F * c.fx);
   const F8 ease_y = c.fy * c.fy * (3.0F - 2.0F * c.fy);
-  const F8 low = mix(fraction(hash_cell(c.x, c.y, key), 0), fraction(hash_cell(c.x + 1, c.y, key), 0), ease_x);
-  const F8 high = mix(fraction(hash_cell(c.x, c.y + 1, key), 0), fraction(hash_cell(c.x + 1, c.y + 1, key), 0), ease_x);
+  const I8 x = add_wrapping(c.x, I8{} + 1);  // the far corner
+  const I8 y = add_wrapping(c.y, I8{} + 1);
+  const F8 low = mix(fraction(hash_cell(c.x, c.y, key), 0), fraction(hash_cell(x, c.y, key), 0), ease_x);
+  const F8 high = mix(fraction(hash_cell(c.x, y, key), 0), fraction(hash_cell(x, y, key), 0), ease_x);
   return c.amplitude * keep * (2.0F * mix(low, high, ease_y) - 1.0F);
 }
 
