@@ -27,6 +27,8 @@ find_package(PkgConfig QUIET)
 roadfix_require(PkgConfig_FOUND pkg-config)
 pkg_check_modules(XXHASH QUIET IMPORTED_TARGET libxxhash)
 roadfix_require(XXHASH_FOUND libxxhash-dev)
+pkg_check_modules(MICROHTTPD QUIET IMPORTED_TARGET libmicrohttpd)
+roadfix_require(MICROHTTPD_FOUND libmicrohttpd-dev)
 find_program(LCM_GEN lcm-gen)
 roadfix_require(LCM_GEN liblcm-bin)
 

@@ -15,6 +15,9 @@ int main(int argc, char** argv) {
   app.add_option("--bus", options.bus, "LCM URL")->capture_default_str();
   app.add_option("--log-in", options.logs, "Look at this log instead; several: a drive and what was replayed from it");
   app.add_option("--log-out", options.log_out, "Write HEALTH of the log to this one, and end");
+  app.add_option("--listen", options.listen,
+                 "address:port of the web page; another machine's needs the token it prints");
+  app.add_flag("--no-dashboard", options.no_dashboard, "No web page");
   app.add_flag("--plain", options.plain, "Lines instead of a screen");
   app.add_flag("--print-config", options.print_config, "Print the effective configuration and end");
   try {

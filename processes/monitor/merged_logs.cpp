@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "bus/message.h"
+#include <utility>
 
 namespace roadfix {
 
@@ -42,6 +41,21 @@ MergedLogs::MergedLogs(const std::vector<std::filesystem::path>& paths) {
 }
 
 std::optional<MergedLogs::Event> MergedLogs::next() {
+  while (const std::optional<Event> event = next_of_any()) {
+    const std::optional<Header> header = read_header(event->bytes);
+    if (files_.size() == 1 || !header) return event;
+    const auto last = last_.find(event->channel);
+    if (last == last_.end()) {
+      last_.emplace(event->channel, *header);
+      return event;
+    }
+    const Header before = std::exchange(last->second, *header);
+    if (before.utime != header->utime || before.run != header->run || before.seq != header->seq) return event;
+  }
+  return std::nullopt;
+}
+
+std::optional<MergedLogs::Event> MergedLogs::next_of_any() {
   File* first = nullptr;
   for (File& file : files_) {
     if (!file.head) continue;
@@ -52,8 +66,7 @@ std::optional<MergedLogs::Event> MergedLogs::next() {
   if (first == nullptr) return std::nullopt;
   const LogEvent event = *first->head;
   first->head = first->reader->next();
-  return Event{event.channel, event.data, event.timestamp_us + first->shift_us,
-               static_cast<std::size_t>(first - files_.data()), event.offset};
+  return Event{event.channel, event.data, event.timestamp_us + first->shift_us};
 }
 
 double MergedLogs::share_done() const {

@@ -2,12 +2,14 @@
 
 #include <iostream>
 #include <memory>
+#include <thread>
 
 #include "bus/log_writer.h"
 #include "bus/message.h"
 #include "bus/run_clock.h"
 #include "bus/run_process.h"
 #include "config/config.h"
+#include "monitor/dashboard.h"
 #include "monitor/handler.h"
 #include "monitor/health_publisher.h"
 #include "monitor/host_facts.h"
@@ -19,6 +21,14 @@ namespace roadfix {
 namespace {
 
 constexpr auto kPatience = std::chrono::milliseconds(50);
+/// Of the share that is read: only what follows the last message makes it whole.
+constexpr double kNotDone = 0.999;
+
+std::unique_ptr<Dashboard> dashboard_of(const MonitorOptions& options, const MonitorConfig& config, Health& health,
+                                        const std::string& name) {
+  if (options.no_dashboard || !options.log_out.empty()) return nullptr;
+  return std::make_unique<Dashboard>(config.dashboard, health, name, !options.logs.empty());
+}
 
 void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   NetworkBus bus(options.bus);
@@ -26,8 +36,10 @@ void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   HostWatch host(config.recordings);
   MonitorHandler handler(config, expectations_of(config, options.vehicle));
   HealthPublisher publisher(bus, config.publish_period, true);
-  Terminal terminal(options.plain, "");
+  const std::unique_ptr<Dashboard> dashboard = dashboard_of(options, config, handler.health(), "the bus");
+  Terminal terminal(options.plain, dashboard ? "Dashboard: " + dashboard->url() : "");
   handler.add(publisher);
+  if (dashboard) handler.add(dashboard->view());
   handler.add(terminal);
   bus.subscribe(".*", [&](const BusMessage& message) { handler.take(message, clock.now_utime()); });
   while (!stop_requested()) {
@@ -66,13 +78,20 @@ void run_logs(const MonitorOptions& options, const MonitorConfig& config) {
     publisher = std::make_unique<HealthPublisher>(*sink, config.publish_period, false);
     handler.add(*publisher);
   }
-  Terminal terminal(true, "");
+  const std::unique_ptr<Dashboard> dashboard =
+      dashboard_of(options, config, handler.health(), options.logs.front().filename().string());
+  Terminal terminal(true, dashboard ? "Dashboard: " + dashboard->url() : "");
+  if (dashboard) handler.add(dashboard->view());
   handler.add(terminal);
   while (const std::optional<MergedLogs::Event> event = logs.next()) {
     if (stop_requested()) return;
     handler.take({event->channel, event->bytes, event->at_us}, event->at_us);
+    if (dashboard) dashboard->board().set_done(kNotDone * logs.share_done());
   }
   if (sink) sink->commit();
+  if (!dashboard) return;
+  dashboard->board().set_done(1.0);
+  while (!stop_requested()) std::this_thread::sleep_for(kPatience);
 }
 
 }  // namespace
@@ -82,6 +101,7 @@ void run_monitor(const MonitorOptions& options) {
   if (!options.vehicle.empty()) {
     config = load_config_or_defaults<MonitorConfig>(options.vehicle / "monitor.yaml", config);
   }
+  if (!options.listen.empty()) config.dashboard.listen = options.listen;
   if (options.print_config) {
     std::cout << config_text(config);
   } else if (options.logs.empty()) {

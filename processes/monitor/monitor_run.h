@@ -15,11 +15,13 @@ struct MonitorOptions {
   std::string bus = kDefaultBusUrl;
   std::vector<std::filesystem::path> logs;  ///< empty: live
   std::filesystem::path log_out;
+  std::string listen;  ///< of the dashboard, instead of monitor.yaml's
+  bool no_dashboard = false;
   bool plain = false;
   bool print_config = false;
 };
 
-/// Until stop_requested() (bus/run_process.h) or, with a log to write, the end of the log. Throws what the user can
+/// Until stop_requested() (bus/run_process.h) or, without a dashboard, the end of the log. Throws what the user can
 /// mend.
 void run_monitor(const MonitorOptions& options);
 

@@ -107,5 +107,9 @@ TEST_CASE("logs are merged by time; one recorded while it was played is put back
   std::string order;
   while (const auto event = logs.next()) order += event->channel;
   CHECK(order == "ABABABABABABABABABAB");
+  MergedLogs twice({a, a});
+  int once = 0;
+  while (twice.next()) ++once;
+  CHECK(once == 10);
   CHECK(logs.share_done() == 1.0);
 }
