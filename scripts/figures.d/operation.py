@@ -1,0 +1,117 @@
+"""operation: what it costs to look, and how soon there is something to see. The rows on latency and soak are measured elsewhere."""
+import os
+import re
+import socket
+import statistics
+import subprocess
+import threading
+import time
+
+from browser import Browser, chromium
+from support import Skipped
+
+SETTLE_S, MEASURE_S = 6, 15
+CLIENTS = 10  # one of them takes nothing
+
+
+class Monitor:
+    """A monitor with its dashboard on a port of its own."""
+
+    def __init__(self, runs, *arguments):
+        words = [str(runs.program("monitor")), "--config", str(runs.root / "configs/demo"), *map(str, arguments)]
+        self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.url = None
+        if "--no-dashboard" not in words:
+            found = re.search(r"http://\S+", self.process.stdout.readline())
+            if not found:
+                raise Skipped("the monitor names no address of its dashboard")
+            self.url = found[0]
+        threading.Thread(target=self.process.stdout.read, daemon=True).start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.wait()
+
+    def cpu_s(self):
+        with open(f"/proc/{self.process.pid}/stat") as stat:
+            fields = stat.read().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def follow(url, reads):
+    """A client of the live stream; one that does not read fills its buffers and stands."""
+    address = re.match(r"http://([^:/]+):(\d+)", url)
+    client = socket.create_connection((address[1], int(address[2])))
+    client.sendall(b"GET /live HTTP/1.1\r\nHost: localhost\r\n\r\n")
+
+    def read():
+        try:
+            while client.recv(1 << 16):
+                pass
+        except OSError:
+            pass
+
+    if reads:
+        threading.Thread(target=read, daemon=True).start()
+    return client
+
+
+def measured_in_namespace(runs):
+    """Shares of one core, per cent: a monitor without a dashboard, and one with ten clients, beside each other on the
+    demo drive and its estimates, played by lcm-logplayer."""
+    log = runs.root / "logs/demo.lcm"
+    estimates = runs.folder("dashboard") / "out.lcm"
+    runs.roadfix("replay", log, "--stages", "wheel_odometry,gnss_ins_ekf,imm_fusion", "--config", runs.root / "configs/demo", "--out", estimates)
+    players = [subprocess.Popen(["lcm-logplayer", str(path)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for path in (log, estimates)]
+    try:
+        with Monitor(runs, "--plain", "--no-dashboard") as bare, Monitor(runs, "--plain", "--listen", "127.0.0.1:0") as watched:
+            clients = [follow(watched.url, reads=i > 0) for i in range(CLIENTS)]
+            time.sleep(SETTLE_S)
+            before = bare.cpu_s(), watched.cpu_s(), time.monotonic()
+            time.sleep(MEASURE_S)
+            span = time.monotonic() - before[2]
+            shares = [100 * (m.cpu_s() - b) / span for m, b in zip((bare, watched), before)]
+            for client in clients:
+                client.close()
+            return shares
+    finally:
+        for player in players:
+            player.kill()
+            player.wait()
+
+
+def dashboard_cpu_pct(runs):
+    """What the dashboard adds to the monitor's CPU."""
+    script = ("import sys; sys.path[:0] = [sys.argv[1]]; import time; from pathlib import Path; import operation, support; "
+              "print(*operation.measured_in_namespace(support.Runs(Path(sys.argv[2]), time.monotonic() + 300)))")
+    route = "ip link set lo up && ip route add 224.0.0.0/4 dev lo"
+    here = runs.root / "scripts/figures.d"
+    text = runs.call("unshare", "-n", "bash", "-c", f'{route} && python3 -B -c "$0" "$@"', script, here, runs.root)
+    bare, watched = map(float, text.split())
+    print(f"figures: monitor alone {bare:.2f} %, with {CLIENTS} clients {watched:.2f} %", file=__import__("sys").stderr)
+    return watched - bare
+
+
+def first_paint_ms(runs):
+    """First contentful paint of the page over loopback, from the start of navigation; median of five."""
+    if not chromium():
+        raise Skipped("no chromium here")
+    with Monitor(runs, "--log-in", runs.root / "logs/demo.lcm", "--listen", "127.0.0.1:0") as monitor, Browser() as browser:
+        browser.size(1280, 900)
+        paints = []
+        for _ in range(5):
+            browser.go(monitor.url)
+            time.sleep(1)
+            paint = browser.wait("document.documentElement.dataset.firstPaintMs")
+            if paint:
+                paints.append(float(paint))
+            browser.go("about:blank")
+        if not paints:
+            raise Skipped("the browser tells of no paint")
+        return statistics.median(paints)
+
+
+MEASUREMENTS = {"dashboard_cpu_pct": dashboard_cpu_pct, "first_paint_ms": first_paint_ms}
