@@ -16,13 +16,13 @@ class Dashboard {
   /// ConfigError.
   Dashboard(const DashboardConfig& config, Health& health, const std::string& name, bool log);
 
-  [[nodiscard]] View& view() { return view_; }
+  [[nodiscard]] DriveView& view() { return view_; }
   [[nodiscard]] Board& board() { return board_; }
   [[nodiscard]] std::string url() const { return server_.url(); }
 
  private:
   Board board_;
-  View view_;
+  DriveView view_;
   DashboardServer server_;
 };
 

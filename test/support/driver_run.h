@@ -9,20 +9,20 @@
 
 namespace roadfix::test {
 
-struct Sent {
+struct Published {
   std::string channel;
   Bytes bytes;
-  bool operator==(const Sent&) const = default;
+  bool operator==(const Published&) const = default;
 };
 
 class CollectedSensors : public SensorOutputs {
  public:
-  std::vector<Sent> sent;
+  std::vector<Published> sent;
 
   template <class T>
   [[nodiscard]] std::vector<T> on(const std::string& channel) const {
     std::vector<T> messages;
-    for (const Sent& message : sent)
+    for (const Published& message : sent)
       if (message.channel == channel) messages.push_back(decode<T>(message.bytes));
     return messages;
   }

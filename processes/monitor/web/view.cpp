@@ -26,14 +26,15 @@ double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::
 
 }  // namespace
 
-View::View(Board& board, Health& health, double rate_hz, bool bytes_stay)
+DriveView::DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay)
     : board_(board),
       health_(health),
       period_us_(std::llround(1e6 / rate_hz)),
       bytes_stay_(bytes_stay),
       reference_("REFERENCE", PoseLimits{}) {}
 
-void View::message(const std::string& channel, const std::string& type, const BusMessage& message, int64_t now_us) {
+void DriveView::message(const std::string& channel, const std::string& type, const BusMessage& message,
+                        int64_t now_us) {
   if (channel == "REFERENCE") {
     PoseFacts facts = pose_facts(decode<pose_t>(message.bytes));
     health_.to_common_frame(facts);
@@ -54,7 +55,7 @@ void View::message(const std::string& channel, const std::string& type, const Bu
   }
 }
 
-void View::keep_picture(const BusMessage& message) {
+void DriveView::keep_picture(const BusMessage& message) {
   const std::span<const uint8_t> bytes = message.bytes;
   const auto copy = [bytes] { return std::make_shared<const std::vector<uint8_t>>(bytes.begin(), bytes.end()); };
   if (bytes_stay_) {
@@ -64,7 +65,7 @@ void View::keep_picture(const BusMessage& message) {
   }
 }
 
-void View::pin(const PoseWatch& watch, const std::string& judged) {
+void DriveView::pin(const PoseWatch& watch, const std::string& judged) {
   if (!watch.usable() || watch.newest()->anchor) return;
   const auto absolute = health_.poses().find(judged);
   if (absolute == health_.poses().end() || !absolute->second.usable() || !absolute->second.newest()->anchor) return;
@@ -78,7 +79,7 @@ void View::pin(const PoseWatch& watch, const std::string& judged) {
   pin.T_enu_local = yaw_only(enu->T_frame_vehicle) * yaw_only(local->T_frame_vehicle).inverse();
 }
 
-std::optional<View::Placed> View::placed(const PoseWatch& watch) const {
+std::optional<DriveView::Placed> DriveView::placed(const PoseWatch& watch) const {
   if (!watch.usable()) return std::nullopt;
   const Odometry& o = watch.newest()->odometry;
   const Eigen::Matrix2d cov = o.cov_pose.topLeftCorner<2, 2>();
@@ -90,7 +91,7 @@ std::optional<View::Placed> View::placed(const PoseWatch& watch) const {
 }
 
 /// Of a moment that both the reference and the estimate have passed.
-std::optional<Eigen::Vector2d> View::error(const PoseWatch& watch) const {
+std::optional<Eigen::Vector2d> DriveView::error(const PoseWatch& watch) const {
   if (!reference_.usable() || !watch.usable()) return std::nullopt;
   const int64_t t_us = std::min(reference_.newest()->odometry.t_us, watch.newest()->odometry.t_us) - 100'000;
   const auto truth = reference_.at(t_us), estimate = watch.at(t_us);
@@ -105,7 +106,7 @@ std::optional<Eigen::Vector2d> View::error(const PoseWatch& watch) const {
                          wrapped(yaw_of(T.q) - yaw_of(truth->T_frame_vehicle.q)));
 }
 
-History::Row View::history_row(const HealthReport& report) const {
+History::Row DriveView::history_row(const HealthReport& report) const {
   History::Row row{report.now_us, static_cast<int>(report.verdict), {}};
   for (const auto& [name, watch] : health_.poses()) {
     const auto place = placed(watch);
@@ -121,7 +122,7 @@ History::Row View::history_row(const HealthReport& report) const {
   return row;
 }
 
-void View::decided(const HealthReport& report, bool) {
+void DriveView::decided(const HealthReport& report, bool) {
   for (const auto& [name, watch] : health_.poses()) pin(watch, report.judged_pose);
   board_.history().add(history_row(report));
   if (!board_.watched() || report.now_us - framed_us_ < period_us_) return;
@@ -129,7 +130,7 @@ void View::decided(const HealthReport& report, bool) {
   board_.put_frame(frame(report));
 }
 
-std::string View::frame(const HealthReport& report) {
+std::string DriveView::frame(const HealthReport& report) {
   FrameParts parts(report);
   for (const auto& [name, watch] : health_.poses()) {
     FramePose pose;

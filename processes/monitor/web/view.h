@@ -15,11 +15,11 @@
 
 namespace roadfix {
 
-class View : public MonitorListener {
+class DriveView : public MonitorListener {
  public:
   /// Both must outlive it. `rate_hz`: frames per second, at most that of the decisions. `bytes_stay`: a log's messages
   /// stay where they are and need no copy.
-  View(Board& board, Health& health, double rate_hz, bool bytes_stay);
+  DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay);
 
   void message(const std::string& channel, const std::string& type, const BusMessage& message, int64_t now_us) override;
   void decided(const HealthReport& report, bool changed) override;

@@ -34,7 +34,7 @@ namespace roadfix {
 namespace {
 
 using test::Bytes;
-using test::Sent;
+using test::Published;
 
 /// A made serial device: what is written here arrives there.
 class Pty {
@@ -84,7 +84,7 @@ class Bench {
   }
   [[nodiscard]] std::size_t count(const std::string& channel) const {
     return static_cast<std::size_t>(
-        std::count_if(sent.begin(), sent.end(), [&](const Sent& s) { return s.channel == channel; }));
+        std::count_if(sent.begin(), sent.end(), [&](const Published& s) { return s.channel == channel; }));
   }
   [[nodiscard]] heartbeat_t heartbeat() const {
     for (auto s = sent.rbegin(); s != sent.rend(); ++s)
@@ -94,7 +94,7 @@ class Bench {
   LiveDriver& driver() { return driver_; }
   const DriverSetup& setup() { return setup_; }
 
-  std::vector<Sent> sent;
+  std::vector<Published> sent;
   bool more = true;
 
  private:
@@ -104,25 +104,25 @@ class Bench {
 };
 
 /// What a replay of the bench's raw messages gives.
-std::vector<Sent> replayed(Bench& bench) {
+std::vector<Published> replayed(Bench& bench) {
   const test::TemporaryFolder folder;
   {
     LogWriter log(folder / "raw.lcm");
-    for (const Sent& s : bench.sent)
+    for (const Published& s : bench.sent)
       if (s.channel.starts_with("RAW_")) log.write(s.channel, read_header(s.bytes)->utime, s.bytes);
     log.commit();
   }
   replay_driver(folder / "raw.lcm", folder / "out.lcm", bench.setup());
   LogReader reader(folder / "out.lcm");
-  std::vector<Sent> out;
+  std::vector<Published> out;
   while (const auto event = reader.next())
     out.push_back({std::string(event->channel), {event->data.begin(), event->data.end()}});
   return out;
 }
 
-std::vector<Sent> sensor_messages(const Bench& bench) {
-  std::vector<Sent> out;
-  for (const Sent& s : bench.sent)
+std::vector<Published> sensor_messages(const Bench& bench) {
+  std::vector<Published> out;
+  for (const Published& s : bench.sent)
     if (!s.channel.starts_with("RAW_") && !s.channel.starts_with("HEARTBEAT_") && !s.channel.starts_with("CONFIG_"))
       out.push_back(s);
   return out;
@@ -161,10 +161,10 @@ TEST_CASE("a pseudo-terminal end to end: raw bytes, samples, and the same sample
   }
   REQUIRE(bench.count("IMU") > 20);
   CHECK(bench.count("IMU") <= 43);
-  const std::vector<Sent> live = sensor_messages(bench);
+  const std::vector<Published> live = sensor_messages(bench);
   CHECK(replayed(bench) == live);
-  bench.sent.erase(
-      std::find_if(bench.sent.begin() + 60, bench.sent.end(), [](const Sent& s) { return s.channel == "RAW_IMU"; }));
+  bench.sent.erase(std::find_if(bench.sent.begin() + 60, bench.sent.end(),
+                                [](const Published& s) { return s.channel == "RAW_IMU"; }));
   CHECK(replayed(bench) != live);  // teeth: a lost raw message shows
 }
 
@@ -380,7 +380,7 @@ TEST_CASE("pictures from files: JPEG out, the same again from the raw ones, one 
   CHECK(bench.count("CAMERA_LEFT") == 6);
   CHECK(bench.count("CAMERA_RIGHT") == 6);
   CHECK(bench.count("RAW_CAMERA_LEFT") == 7);  // with the opening
-  const std::vector<Sent> live = sensor_messages(bench);
+  const std::vector<Published> live = sensor_messages(bench);
   CHECK(replayed(bench) == live);
   const image_t left = decode<image_t>(live[0].bytes), right = decode<image_t>(live[1].bytes);
   CHECK(left.utime == right.utime);
