@@ -87,7 +87,7 @@ class GnssIns {
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
   void use_position(const Pending& measured);
-  [[nodiscard]] bool velocity_confirmed(int64_t t_us) const;
+  [[nodiscard]] bool agrees_with(AidingSource source, int64_t t_us) const;
   void recover(const Pending& p);
   void align_again();
   [[nodiscard]] bool moved_meanwhile(double dt) const;

@@ -69,7 +69,10 @@ void GnssIns::remember(const GnssFix& fix) {
     return std::tuple(f.cov_enu.trace(), f.antenna.latitude, f.antenna.longitude, f.antenna.height);
   };
   if (fix_ && fix_->t_us == fix.t_us) {
-    if (rank(fix) < rank(*fix_)) fix_ = fix;
+    if (rank(fix) < rank(*fix_)) {
+      if (fix_before_ && fix_before_->t_us == fix.t_us) fix_before_ = fix;
+      fix_ = fix;
+    }
     return;
   }
   // A fast receiver's neighbouring fixes are too close for a velocity: the older one stays for twice the least spacing.

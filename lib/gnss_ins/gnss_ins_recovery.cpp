@@ -39,12 +39,9 @@ void GnssIns::use(const Pending& measured) {
   }
 }
 
-bool GnssIns::velocity_confirmed(int64_t t_us) const {
-  for (const AidingSource source : {AidingSource::kGnssVelocity, AidingSource::kWheelSpeed}) {
-    const int64_t at = used_at_us_[static_cast<size_t>(source)];
-    if (at != 0 && seconds_between(at, t_us) < kConfirmed) return true;
-  }
-  return false;
+bool GnssIns::agrees_with(AidingSource source, int64_t t_us) const {
+  const int64_t at = used_at_us_[static_cast<size_t>(source)];
+  return at != 0 && seconds_between(at, t_us) < kConfirmed;
 }
 
 void GnssIns::use_position(const Pending& measured) {
@@ -65,7 +62,8 @@ void GnssIns::use_position(const Pending& measured) {
   AidingRecord r = applier_.apply(*core_, p, gates_);
   // A jump, or a receiver that is dragged away from what wheels or its own velocity say, tells nothing of the noise.
   const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
-  const bool dragged = jump_.one_sided() && velocity_confirmed(p.t_us);
+  const bool heading_holds = agrees_with(AidingSource::kGnssVelocity, p.t_us);
+  const bool dragged = jump_.one_sided() && (heading_holds || agrees_with(AidingSource::kWheelSpeed, p.t_us));
   if (!jumped && !dragged) quality.noise.learn(r);
   if (r.status == AidingStatus::kGated) {
     const AidingRecord level = applier_.apply_level(*core_, p, gates_);
@@ -85,7 +83,8 @@ void GnssIns::use_position(const Pending& measured) {
         jumped || dragged ? std::clamp(agreed, a.recovery_s, std::max(a.recovery_s, a.jump_s)) : a.recovery_s;
     if (refused_ >= a.recovery_fixes && seconds_between(refused_since_us_, p.t_us) >= patience) {
       // Position and velocity were taken from the fixes and do not hold: the heading must be wrong.
-      lost_ = !dragged && recovered_at_us_ != 0 && seconds_between(recovered_at_us_, p.t_us) < kRecoveryHolds;
+      // Wheels do not tell: their speed is right on a wrong heading as well.
+      lost_ = !heading_holds && recovered_at_us_ != 0 && seconds_between(recovered_at_us_, p.t_us) < kRecoveryHolds;
       recovered_at_us_ = p.t_us;
       agreed_since_us_ = 0;
       if (!lost_) recover(p);
