@@ -27,7 +27,13 @@ constexpr double kNotDone = 0.999;
 std::unique_ptr<Dashboard> dashboard_of(const MonitorOptions& options, const MonitorConfig& config, Health& health,
                                         const std::string& name) {
   if (options.no_dashboard || !options.log_out.empty()) return nullptr;
-  return std::make_unique<Dashboard>(config.dashboard, health, name, !options.logs.empty());
+  try {
+    return std::make_unique<Dashboard>(config.dashboard, health, name, !options.logs.empty());
+  } catch (const ListenError& e) {
+    if (!options.listen.empty() || !options.logs.empty()) throw;  // the page is what was asked for
+    std::cerr << e.what() << "; the monitor goes on without it\n";
+    return nullptr;
+  }
 }
 
 void run_live(const MonitorOptions& options, const MonitorConfig& config) {

@@ -79,9 +79,9 @@ class DashboardServer::Connections {
                                MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(options.clients),
                                MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(options.patience_s),
                                MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes, MHD_OPTION_NOTIFY_CONNECTION,
-                               &on_connection, this, MHD_OPTION_LISTENING_ADDRESS_REUSE, 1U, MHD_OPTION_END);
+                               &on_connection, this, MHD_OPTION_END);
     if (daemon_ == nullptr) {
-      throw ServerError("dashboard: cannot listen on " + options.address + ":" + std::to_string(options.port) + ": " +
+      throw ListenError("dashboard: cannot listen on " + options.address + ":" + std::to_string(options.port) + ": " +
                         std::strerror(errno));
     }
   }

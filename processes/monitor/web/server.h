@@ -15,9 +15,14 @@
 
 namespace roadfix {
 
-/// An address that cannot be listened on; the text says why.
+/// A dashboard that cannot be; the text says why.
 struct ServerError : std::runtime_error {
   using std::runtime_error::runtime_error;
+};
+
+/// The address is right, but taken, or not this machine's.
+struct ListenError : ServerError {
+  using ServerError::ServerError;
 };
 
 struct ServerOptions {

@@ -136,6 +136,14 @@ TEST_CASE("hostile requests are refused or dropped, and the page goes on") {
   CHECK_THAT(good.until("\r\n\r\n7"), Catch::Contains("200 OK"));
 }
 
+TEST_CASE("an address that is taken is told as such") {
+  Board board("x", false);
+  const DashboardServer first(board, any_port());
+  ServerOptions same = any_port();
+  same.port = std::stoi(address(first).substr(address(first).rfind(':') + 1));
+  CHECK_THROWS_AS(DashboardServer(board, same), ListenError);
+}
+
 TEST_CASE("no more connections than allowed, and idle ones make room again") {
   Board board("x", false);
   board.put_frame("7");

@@ -5,6 +5,7 @@
 #include <roadfix/pose_t.hpp>
 
 #include "bus/message.h"
+#include "config/config.h"
 #include "monitor/handler.h"
 #include "monitor/messages.h"
 #include "support/shared_data.h"
@@ -144,4 +145,7 @@ TEST_CASE("a vehicle's folder says what to expect") {
   config.channels = {{"IMU", 200.0}, {"POSE_VO", std::nullopt}};
   CHECK(expectations_of(config, test::source_path("configs/demo")).channels.front().rate == 200.0);
   CHECK(expectations_of(config, "").channels.size() == 2);
+  const auto example = load_config<MonitorConfig>(test::source_path("configs/example/monitor.yaml"));
+  CHECK(example.channels.front().name == "POSE_VO");
+  CHECK(example.health.process.disk_gib == 20.0);
 }

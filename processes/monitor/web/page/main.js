@@ -68,7 +68,7 @@ async function log(about) {
   say('');
   timeline.setCount(about.frames);
   timeline.setHistory(await history());
-  await timeline.go(at > 0 ? Math.round(at * 5) : 0);
+  await timeline.goToSecond(at > 0 ? at : 0);
 }
 
 const about = await (await fetch('about')).json();

@@ -89,6 +89,17 @@ export class Timeline {
     }
   }
 
+  /** The frame of so many seconds into the drive, by bisection: a very long log keeps fewer frames. */
+  async goToSecond(second) {
+    const start = (await this.frame(0)).t;
+    let low = 0, high = this.count - 1;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if ((await this.frame(middle)).t < start + 1000 * second) low = middle + 1; else high = middle;
+    }
+    await this.go(low);
+  }
+
   async frame(index) {
     const chunk = Math.floor(index / CHUNK);
     if (!this.chunks.has(chunk)) {
