@@ -32,8 +32,8 @@ std::vector<uint8_t> lucas_kanade(const FlowPyramid& first, const FlowPyramid& s
 
 }  // namespace
 
-FlowPyramid flow_pyramid(const cv::Mat& gray, const FlowConfig& config) {
-  FlowPyramid pyramid;
+FlowPyramid flow_pyramid(const cv::Mat& gray, const FlowConfig& config, FlowPyramid spare) {
+  FlowPyramid pyramid = std::move(spare);
   cv::buildOpticalFlowPyramid(gray, pyramid.mats, cv::Size(config.window_px, config.window_px), config.levels, true,
                               cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);  // a copy: the caller may reuse gray
   return pyramid;

@@ -24,7 +24,8 @@ struct FlowPyramid {
   [[nodiscard]] const cv::Mat& picture(size_t level = 0) const { return mats[2 * level]; }
 };
 
-FlowPyramid flow_pyramid(const cv::Mat& gray, const FlowConfig& config);
+/// `spare`: an old one whose memory is used again; a picture of this size would get fresh pages each time.
+FlowPyramid flow_pyramid(const cv::Mat& gray, const FlowConfig& config, FlowPyramid spare = {});
 
 /// Follows `from` in the first picture to the second, beginning at `to`, which receives the result. True where the
 /// point was found inside the picture and the way back ended where it had begun.

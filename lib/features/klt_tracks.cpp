@@ -1,6 +1,7 @@
 #include "features/klt_tracks.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "features/corners.h"
 #include "features/saved_features.h"
@@ -16,7 +17,7 @@ FlowConfig flow_config(const FrontEndConfig& config) {
 
 std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Feature> hints) {
   const FlowConfig flow = flow_config(config_);
-  FlowPyramid pyramid = flow_pyramid(gray, flow);
+  FlowPyramid pyramid = flow_pyramid(gray, flow, std::exchange(spare_, {}));
   num_expected_ = static_cast<int>(live_.size());
   const bool same_size = !pyramid_.empty() && pyramid_.picture().size() == gray.size();
   if (same_size && !live_.empty()) {
@@ -37,7 +38,7 @@ std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Featu
   } else {
     live_.clear();
   }
-  pyramid_ = std::move(pyramid);
+  spare_ = std::exchange(pyramid_, std::move(pyramid));
   return live_;
 }
 

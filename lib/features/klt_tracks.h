@@ -26,6 +26,7 @@ class KltTracks final : public FrontEnd {
   int64_t next_track_ = 1;
   int num_expected_ = 0;
   std::vector<Feature> live_;  ///< ascending by track, where they are in the last picture
+  FlowPyramid spare_;          ///< of the picture before, for its memory
   FlowPyramid pyramid_;        ///< of the last picture, whose pixels are its first level
 };
 
