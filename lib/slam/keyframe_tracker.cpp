@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/core.hpp>
 
 #include "geometry/so3.h"
@@ -13,6 +14,8 @@ namespace {
 /// Relative, of focal length times distance of the eyes as calibrations come; pictures cannot tell it. Rectified pairs
 /// are off by about this much (Cvisic et al., Recalibrating the KITTI dataset camera setup, 2021).
 constexpr double kStereoScaleStd = 0.01;
+
+constexpr double kStandingShare = 0.4;  ///< of a keyframe's landmarks, below which one is made at a standstill too
 
 /// How a camera pose's covariance becomes the vehicle's: the lever arm turns attitude error into position error.
 Matrix6d vehicle_covariance(const Matrix6d& cov_camera, const SE3& T_map_camera, const SE3& T_camera_vehicle) {
@@ -263,8 +266,7 @@ void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
 
 bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const {
   const Eigen::Quaterniond q_now_keyframe = T_map_camera_.q.conjugate() * map_.last().T_map_camera.q;
-  double flow = 0.0;
-  int count = 0;
+  std::vector<double> flows;
   for (const Feature& f : features) {
     const Landmark* landmark = map_.find(f.track);
     if (landmark == nullptr || landmark->sightings.empty()) continue;
@@ -272,13 +274,17 @@ bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const
     const auto now = left_.unproject(f.pixel.cast<double>());
     if (seen.keyframe != map_.last().id || !now) continue;
     const Eigen::Vector3d turned = q_now_keyframe * seen.left.homogeneous();  // where turning alone would have put it
-    flow += left_.focal() * (*now - turned.hnormalized()).norm();
-    ++count;
+    flows.push_back(left_.focal() * (*now - turned.hnormalized()).norm());
   }
-  if (count == 0) return true;
-  flow /= count;
-  if (flow < config_.standing_flow_px) return false;
-  return flow > config_.keyframe_flow_px || out_.num_inliers < config_.keyframe_min_share * landmarks_at_keyframe_;
+  if (flows.empty()) return true;
+  const double mean = std::accumulate(flows.begin(), flows.end(), 0.0) / static_cast<double>(flows.size());
+  const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
+  std::nth_element(flows.begin(), middle, flows.end());
+  // Standing still tells nothing new, but what drives by covers tracks for good.
+  const bool standing = *middle < config_.standing_flow_px;
+  const double share = standing ? kStandingShare : config_.keyframe_min_share;
+  if (out_.num_inliers < share * landmarks_at_keyframe_) return true;
+  return !standing && mean > config_.keyframe_flow_px;
 }
 
 void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features) {
