@@ -132,6 +132,23 @@ TEST_CASE("bad pictures are survived and called by name") {
   CHECK(run.tracker.last().reset_counter == 0);
 }
 
+TEST_CASE("a frozen picture looks like standing, and what follows is right or a jump that is counted") {
+  Run run(true);
+  for (int i = 0; i < kFrames; ++i) {
+    CameraFrame frame = drive()[static_cast<size_t>(i)];
+    if (i > 8 && i <= 12) {
+      frame.left = drive()[8].left;
+      frame.right = drive()[8].right;
+    }
+    const TrackedFrame& out = run.tracker.process(frame);
+    if (i == 12) CHECK(out.odometry.velocity.norm() < 0.1);
+  }
+  const TrackedFrame& last = run.tracker.last();
+  CHECK(last.odometry.validity == Validity::kValid);
+  const Vector6d error = local(last.odometry.T_frame_vehicle, true_pose(kFrames - 1));
+  CHECK((error.head<3>().norm() < 0.02 * 0.8 * kFrames || last.reset_counter > 0));
+}
+
 TEST_CASE("darkness ends in lost within half a second, and a restart takes the pose given") {
   Run run(true);
   const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1);
