@@ -32,6 +32,9 @@ void run(const Options& options) {
   add(check_spy(path != nullptr ? path : "", "/", build / "roadfix_types.jar"));
   constexpr double kGibi = 1024.0 * 1024.0 * 1024.0;
   add({check_clock(), check_disk(options.log_folder, static_cast<std::uint64_t>(options.wanted_gib * kGibi))});
+  add({check_realtime()});
+  add(check_services("/"));
+  add(check_devices("/"));
   if (print_findings(findings, std::cout) == Level::kError) throw CLI::RuntimeError(1);
 }
 
@@ -41,8 +44,9 @@ void add_doctor_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   const char* url = std::getenv("LCM_DEFAULT_URL");
   options->url = url != nullptr ? url : "udpm://239.255.76.67:7667?ttl=0";
-  CLI::App* command =
-      app.add_subcommand("doctor", "Check route, buffers, TTL, loop-back, Java, clock and disk; print what mends each");
+  CLI::App* command = app.add_subcommand("doctor",
+                                         "Check route, buffers, TTL, loop-back, Java, clock, disk, real time, services "
+                                         "and devices; print what mends each");
   command->add_option("--url", options->url, "the bus")->capture_default_str();
   command->add_option("--logs", options->log_folder, "where recordings go")->capture_default_str();
   command->add_option("--space-gib", options->wanted_gib, "space that a drive wants")->capture_default_str();

@@ -56,6 +56,17 @@ Finding check_clock();
 /// Space left where recordings go.
 Finding check_disk(const std::filesystem::path& folder, std::uint64_t wanted_bytes);
 
+/// Whether --realtime will be granted; the second form is told who asks and with which limits (RLIMIT_RTPRIO, bytes of
+/// RLIMIT_MEMLOCK).
+Finding check_realtime();
+Finding check_realtime(bool root, std::uint64_t priority_limit, std::uint64_t memory_limit);
+
+/// Whether settings and services come back after a restart: ROOT/etc/sysctl.d and ROOT/etc/systemd/system.
+std::vector<Finding> check_services(const std::filesystem::path& root);
+
+/// Serial ports and cameras below ROOT/dev: whether they may be opened by us. Nothing where there are none.
+std::vector<Finding> check_devices(const std::filesystem::path& root);
+
 /// Prints a line per finding, worst last, and the mending commands; returns the worst level.
 Level print_findings(const std::vector<Finding>& findings, std::ostream& out);
 

@@ -52,6 +52,9 @@ std::vector<std::string> command_line(const SupervisedProcess& process, const st
   const std::filesystem::path beside = programs / name;
   std::vector<std::string> command = {std::filesystem::exists(beside) ? beside.string() : name};
   if (!process.plain) command.insert(command.end(), {"--config", vehicle.string(), "--bus", bus});
+  if (process.realtime_priority > 0) {
+    command.insert(command.end(), {"--realtime", std::to_string(process.realtime_priority)});
+  }
   command.insert(command.end(), process.arguments.begin(), process.arguments.end());
   return command;
 }

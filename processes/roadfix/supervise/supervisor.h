@@ -21,6 +21,7 @@ struct SupervisedProcess {
   std::string name;                    ///< what people call it; the program's name where `program` is empty
   std::string program;                 ///< looked for beside roadfix first, then in PATH
   std::vector<std::string> arguments;  ///< after --config and --bus
+  int realtime_priority = 0;           ///< of our programs: --realtime; 0: as everybody
   bool plain = false;                  ///< no --config and --bus: a program that is not ours, for example lcm-logger
 };
 
@@ -41,7 +42,10 @@ void visit(SupervisedProcess& c, Visitor& v) {
   v.text("name", c.name);
   v.text("program", c.program);
   v.texts("arguments", c.arguments);
+  v.integer("realtime_priority", c.realtime_priority, 0, 99);
   v.boolean("plain", c.plain);
+  v.check("realtime_priority", !c.plain || c.realtime_priority == 0,
+          "is for our own programs; for others: program: chrt, arguments: [-f, \"50\", NAME]");
 }
 
 template <class Visitor>

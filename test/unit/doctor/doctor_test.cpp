@@ -114,6 +114,37 @@ TEST_CASE("the disk check compares with what a drive wants") {
   CHECK(check_disk("/no/such/folder", 1).level == Level::kError);
 }
 
+TEST_CASE("real time: root may, others as far as their limits go") {
+  CHECK(check_realtime(true, 0, 0).level == Level::kOk);
+  CHECK(check_realtime(false, 0, UINT64_MAX).level == Level::kWarning);
+  CHECK(check_realtime(false, 0, UINT64_MAX).mend.find("rtprio") != std::string::npos);
+  CHECK(check_realtime(false, 60, 65536).seen.find("64 KiB") != std::string::npos);
+  CHECK(check_realtime(false, 60, UINT64_MAX).level == Level::kOk);
+}
+
+TEST_CASE("settings and services: not there, installed only, enabled") {
+  const MadeRoot root;
+  CHECK(check_services(root.path())[0].level == Level::kWarning);
+  CHECK(check_services(root.path())[1].level == Level::kOk);  // a desk needs none
+  root.write("etc/sysctl.d/60-roadfix.conf", "net.core.rmem_max = 8388608\n");
+  root.write("etc/systemd/system/roadfix.target", "");
+  CHECK(check_services(root.path())[0].level == Level::kOk);
+  CHECK(check_services(root.path())[1].level == Level::kWarning);
+  root.write("etc/systemd/system/roadfix.target.wants/roadfix@recorder.service", "");
+  CHECK(check_services(root.path())[1].seen == "1 start with the machine");
+}
+
+TEST_CASE("devices: what is there and may be opened") {
+  const MadeRoot root;
+  CHECK(check_devices(root.path()).empty());
+  root.write("dev/ttyACM0", "");
+  root.write("dev/null0", "");
+  const std::vector<Finding> findings = check_devices(root.path());
+  REQUIRE(findings.size() == 1);
+  CHECK(findings[0].level == Level::kOk);
+  CHECK(findings[0].seen == "/dev/ttyACM0");
+}
+
 TEST_CASE("the worst finding comes last and is returned") {
   std::ostringstream out;
   CHECK(print_findings({{Level::kError, "b", "bad", "mend it"}, {Level::kOk, "a", "fine", ""}}, out) == Level::kError);

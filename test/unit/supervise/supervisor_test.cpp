@@ -10,7 +10,7 @@ namespace roadfix {
 namespace {
 
 SupervisedProcess shell(const std::string& name, const std::string& script) {
-  return {name, "sh", {"-c", script}, true};
+  return {name, "sh", {"-c", script}, 0, true};
 }
 
 /// Steps until `done` or five seconds are over; true when done.
@@ -42,10 +42,11 @@ int count(const std::vector<std::string>& lines, const std::string& part) {
 
 TEST_CASE("our processes get the vehicle and the bus, others only their own arguments") {
   const std::vector<std::string> ours =
-      command_line({"gnss_ins_ekf", "", {"--realtime"}, false}, "/vehicle", "udpm://", "/no/where");
-  CHECK(ours == std::vector<std::string>{"gnss_ins_ekf", "--config", "/vehicle", "--bus", "udpm://", "--realtime"});
+      command_line({"gnss_ins_ekf", "", {"--memory", "m"}, 50, false}, "/vehicle", "udpm://", "/no/where");
+  CHECK(ours == std::vector<std::string>{"gnss_ins_ekf", "--config", "/vehicle", "--bus", "udpm://", "--realtime", "50",
+                                         "--memory", "m"});
   const std::vector<std::string> other =
-      command_line({"log", "lcm-logger", {"-q", "x.lcm"}, true}, "/vehicle", "udpm://", "/no/where");
+      command_line({"log", "lcm-logger", {"-q", "x.lcm"}, 0, true}, "/vehicle", "udpm://", "/no/where");
   CHECK(other == std::vector<std::string>{"lcm-logger", "-q", "x.lcm"});
 }
 
@@ -69,7 +70,7 @@ TEST_CASE("a killed process comes back, and the others are left alone") {
 
 TEST_CASE("a program that is not there is said so") {
   std::vector<std::string> lines;
-  Supervisor supervisor(quick({{"nothing", "roadfix_no_such_program", {}, true}}), "/", "/",
+  Supervisor supervisor(quick({{"nothing", "roadfix_no_such_program", {}, 0, true}}), "/", "/",
                         [&](const std::string& l) { lines.push_back(l); });
   REQUIRE(step_until(supervisor, [&] { return supervisor.restarts() >= 1; }));
   CHECK(count(lines, "cannot be run") >= 1);
@@ -95,6 +96,8 @@ TEST_CASE("run.yaml is strict and names what is missing") {
   CHECK(config.processes.size() == 2);
   CHECK(config.bus == "udpm://239.255.76.67:7667?ttl=0");
   CHECK_THROWS_WITH(parse_config<RunConfig>("processes: [{program: x}]", "run.yaml"), Catch::Contains("name"));
+  CHECK_THROWS_WITH(parse_config<RunConfig>("processes: [{name: x, plain: true, realtime_priority: 50}]", "run.yaml"),
+                    Catch::Contains("chrt"));
   CHECK_THROWS_WITH(parse_config<RunConfig>("proceses: []", "run.yaml"), Catch::Contains("processes"));
 }
 
