@@ -7,6 +7,7 @@
 #include "bus/live_stage.h"
 #include "bus/network_bus.h"
 #include "bus/replay.h"
+#include "bus/service.h"
 #include "geometry/determinism.h"
 
 namespace roadfix {
@@ -26,10 +27,12 @@ struct Arguments {
   std::string memory;
   std::string log_in;
   std::string log_out;
+  int realtime = 0;
   bool print_config = false;
 };
 
 void run_live(const Arguments& arguments, const MakeStage& make, const std::string& name) {
+  if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
   LiveStage live([&] { return make(arguments.config); }, bus);
   if (!arguments.memory.empty()) {
@@ -46,7 +49,13 @@ void run_live(const Arguments& arguments, const MakeStage& make, const std::stri
               << "net.core.rmem_max=" << kReceiveBufferBytes << "\n";
   }
   catch_stop_signals();
-  while (!stop_requested()) live.step(std::chrono::milliseconds(100));
+  ServiceNotifier service;
+  service.ready("on " + arguments.bus);
+  while (!stop_requested()) {
+    live.step(std::chrono::milliseconds(100));
+    service.alive();
+  }
+  service.stopping();
   live.stop();
 }
 
@@ -79,6 +88,8 @@ int run_process(int argc, char** argv, const MakeStage& make) {
   app.add_option("--config", arguments.config, "The vehicle's configuration folder")->required();
   app.add_option("--bus", arguments.bus, "LCM URL")->capture_default_str();
   app.add_option("--memory", arguments.memory, "Folder for what is kept from one start to the next");
+  app.add_option("--realtime", arguments.realtime, "Scheduling priority (SCHED_FIFO); others wait while this runs")
+      ->check(CLI::Range(1, 99));
   CLI::Option* log_in = app.add_option("--log-in", arguments.log_in, "Read the inputs from this log, not from the bus");
   CLI::Option* log_out = app.add_option("--log-out", arguments.log_out, "Write the outputs to this log");
   log_in->needs(log_out);

@@ -1,5 +1,5 @@
 /// The main of every stage's process: live on the bus, or over a log.
-///   PROCESS --config DIR [--bus URL] [--memory DIR]       live, until SIGINT or SIGTERM
+///   PROCESS --config DIR [--bus URL] [--memory DIR] [--realtime PRIORITY]       live, until SIGINT or SIGTERM
 ///   PROCESS --config DIR --log-in LOG --log-out LOG       the same handler over a log, deterministic
 ///   PROCESS --config DIR --print-config                   the effective configuration
 #pragma once

@@ -8,6 +8,7 @@
 #include "bus/message.h"
 #include "bus/run_clock.h"
 #include "bus/run_process.h"
+#include "bus/service.h"
 #include "config/config.h"
 #include "monitor/dashboard.h"
 #include "monitor/handler.h"
@@ -48,8 +49,11 @@ void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   if (dashboard) handler.add(dashboard->view());
   handler.add(terminal);
   bus.subscribe(".*", [&](const BusMessage& message) { handler.take(message, clock.now_utime()); });
+  ServiceNotifier service;
+  service.ready("on " + options.bus);
   while (!stop_requested()) {
     bus.handle(kPatience);
+    service.alive();
     const int64_t now_us = clock.now_utime();
     if (host.due(now_us)) handler.health().host(now_us, host.facts(now_us, bus.kernel_drops()));
     handler.advance(now_us);

@@ -14,6 +14,7 @@
 #include "bus/process_facts.h"
 #include "bus/run_clock.h"
 #include "bus/run_process.h"
+#include "bus/service.h"
 #include "config/config.h"
 #include "recorder/message_queue.h"
 #include "recorder/recording.h"
@@ -31,6 +32,7 @@ struct Options {
   std::filesystem::path vehicle;
   std::string bus = kDefaultBusUrl;
   std::string folder;
+  int realtime = 0;
   bool print_config = false;
 };
 
@@ -120,6 +122,7 @@ int record(const Options& options) {
     return 0;
   }
   catch_stop_signals();
+  if (options.realtime > 0) make_realtime(options.realtime);
   NetworkBus bus(options.bus);
   RunClock clock;
   ProcessLoad load;
@@ -131,10 +134,13 @@ int record(const Options& options) {
       config.channels, [&](const BusMessage& message) { recording.push(message); }, unlimited);
   std::cout << "recording to " << config.folder << "/" << name << ".*.lcm" << std::endl;
 
+  ServiceNotifier service;
+  service.ready("recording to " + config.folder);
   int64_t next_heartbeat_us = 0;
   bool said = false;
   for (int64_t seq = 0; !stop_requested();) {
     bus.handle(kPatience);
+    service.alive();
     if (recording.stopped() && !said) {
       said = true;
       std::cerr << "recorder: stopped: " << recording.recording().reason() << std::endl;
@@ -143,6 +149,7 @@ int record(const Options& options) {
     next_heartbeat_us = clock.now_utime() + kHeartbeat_us;
     publish_heartbeat(bus, clock, load, recording, seq++);
   }
+  service.stopping();
   const bool early = recording.stopped();
   recording.finish();
   std::cout << "recorded " << recording.recording().files().size() << " files" << std::endl;
@@ -159,6 +166,7 @@ int main(int argc, char** argv) {
       ->check(CLI::ExistingDirectory);
   app.add_option("--bus", options.bus, "LCM URL")->capture_default_str();
   app.add_option("--folder", options.folder, "where to record to, instead of recorder.yaml's");
+  app.add_option("--realtime", options.realtime, "scheduling priority (SCHED_FIFO)")->check(CLI::Range(1, 99));
   app.add_flag("--print-config", options.print_config, "print the effective configuration and end");
   try {
     app.parse(argc, argv);

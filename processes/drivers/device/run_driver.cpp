@@ -9,6 +9,7 @@
 #include "bus/network_bus.h"
 #include "bus/run_process.h"
 #include "bus/schema.h"
+#include "bus/service.h"
 #include "drivers/device/live_driver.h"
 
 namespace roadfix {
@@ -23,6 +24,7 @@ struct Arguments {
   std::string device;
   std::string log_in;
   std::string log_out;
+  int realtime = 0;
   bool print_config = false;
 };
 
@@ -40,17 +42,22 @@ class LogOutputs : public SensorOutputs {
 };
 
 void run_live(const Arguments& arguments, const DriverSetup& setup) {
+  if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
   catch_stop_signals();
   LiveDriver driver(setup, bus);
+  ServiceNotifier service;
+  service.ready("on " + arguments.bus);
   std::string said;
   while (!stop_requested() && driver.step(kPatience)) {
+    service.alive();
     const std::string trouble = driver.trouble();
     const std::string kind = trouble.substr(0, trouble.find(';'));
     if (kind == said) continue;
     said = kind;
     std::cerr << setup.name << ": " << (trouble.empty() ? driver.device_name() + ": bytes come" : trouble) << std::endl;
   }
+  service.stopping();
   driver.stop();
 }
 
@@ -101,6 +108,8 @@ int run_driver(int argc, char** argv, const DriverProgram& program) {
   app.add_option("--config", arguments.config, "The vehicle's configuration folder")->required();
   app.add_option("--bus", arguments.bus, "LCM URL")->capture_default_str();
   app.add_option("--device", arguments.device, "Instead of the configured device");
+  app.add_option("--realtime", arguments.realtime, "Scheduling priority (SCHED_FIFO); others wait while this runs")
+      ->check(CLI::Range(1, 99));
   CLI::Option* log_in = app.add_option("--log-in", arguments.log_in, "Take the raw bytes from this log, not a device");
   CLI::Option* log_out = app.add_option("--log-out", arguments.log_out, "Write the messages to this log");
   log_in->needs(log_out);
