@@ -7,19 +7,19 @@ namespace roadfix::test {
 
 class CollectedOutputs : public Outputs {
  public:
-  struct Sent {
+  struct Published {
     int output;
     std::vector<uint8_t> bytes;
   };
 
   int64_t now_utime = 0;
-  std::vector<Sent> sent;
+  std::vector<Published> sent;
 
   /// The messages of one output, decoded.
   template <class T>
   std::vector<T> of(int output) const {
     std::vector<T> messages;
-    for (const Sent& s : sent) {
+    for (const Published& s : sent) {
       if (s.output == output) messages.push_back(decode<T>(s.bytes));
     }
     return messages;

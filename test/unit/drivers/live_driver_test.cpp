@@ -1,132 +1,33 @@
 // Drivers on a bus, with devices that are pseudo-terminals, sockets and files: unplugged, replugged, and replayed.
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <iostream>
-#include <opencv2/imgcodecs.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
-#include <roadfix/image_t.hpp>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/raw_t.hpp>
 #include <roadfix/wheels_t.hpp>
 #include <thread>
 
-#include "bus/log_reader.h"
-#include "bus/log_writer.h"
-#include "bus/memory_bus.h"
 #include "config/config.h"
-#include "drivers/camera_driver/handler.h"
-#include "drivers/camera_driver/pnm.h"
-#include "drivers/device/live_driver.h"
-#include "drivers/device/run_driver.h"
 #include "drivers/gnss_driver/handler.h"
 #include "drivers/imu_driver/handler.h"
 #include "drivers/wheel_driver/handler.h"
-#include "support/driver_run.h"
-#include "support/temporary_folder.h"
+#include "support/driver_bench.h"
 
 namespace roadfix {
 namespace {
 
+using test::Bench;
 using test::Bytes;
+using test::Pty;
 using test::Published;
-
-/// A made serial device: what is written here arrives there.
-class Pty {
- public:
-  Pty() : main_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
-    REQUIRE(::grantpt(main_) == 0);
-    REQUIRE(::unlockpt(main_) == 0);
-    name_ = ::ptsname(main_);
-  }
-  ~Pty() { ::close(main_); }
-  Pty(const Pty&) = delete;
-  Pty& operator=(const Pty&) = delete;
-
-  void write(const Bytes& bytes) const {
-    REQUIRE(::write(main_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()));
-  }
-  [[nodiscard]] Bytes read() const {
-    Bytes bytes(65536);
-    const ssize_t size = ::read(main_, bytes.data(), bytes.size());
-    bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
-    return bytes;
-  }
-  [[nodiscard]] const std::string& name() const { return name_; }
-
- private:
-  int main_;
-  std::string name_;
-};
-
-/// A driver on a bus of memory, with everything that it published.
-class Bench {
- public:
-  explicit Bench(DriverSetup setup) : setup_(std::move(setup)), driver_(setup_, bus_) {
-    bus_.subscribe(".*", [this](const BusMessage& m) {
-      sent.push_back({std::string(m.channel), {m.bytes.begin(), m.bytes.end()}});
-    });
-  }
-  template <class Done>
-  bool step_until(const Done& done) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (!done()) {
-      if (std::chrono::steady_clock::now() > end) return false;
-      more = driver_.step(std::chrono::milliseconds(5));
-      bus_.handle(std::chrono::milliseconds(0));
-    }
-    return true;
-  }
-  [[nodiscard]] std::size_t count(const std::string& channel) const {
-    return static_cast<std::size_t>(
-        std::count_if(sent.begin(), sent.end(), [&](const Published& s) { return s.channel == channel; }));
-  }
-  [[nodiscard]] heartbeat_t heartbeat() const {
-    for (auto s = sent.rbegin(); s != sent.rend(); ++s)
-      if (s->channel.starts_with("HEARTBEAT_")) return decode<heartbeat_t>(s->bytes);
-    return {};
-  }
-  LiveDriver& driver() { return driver_; }
-  const DriverSetup& setup() { return setup_; }
-
-  std::vector<Published> sent;
-  bool more = true;
-
- private:
-  DriverSetup setup_;
-  MemoryBus bus_;
-  LiveDriver driver_;
-};
-
-/// What a replay of the bench's raw messages gives.
-std::vector<Published> replayed(Bench& bench) {
-  const test::TemporaryFolder folder;
-  {
-    LogWriter log(folder / "raw.lcm");
-    for (const Published& s : bench.sent)
-      if (s.channel.starts_with("RAW_")) log.write(s.channel, read_header(s.bytes)->utime, s.bytes);
-    log.commit();
-  }
-  replay_driver(folder / "raw.lcm", folder / "out.lcm", bench.setup());
-  LogReader reader(folder / "out.lcm");
-  std::vector<Published> out;
-  while (const auto event = reader.next())
-    out.push_back({std::string(event->channel), {event->data.begin(), event->data.end()}});
-  return out;
-}
-
-std::vector<Published> sensor_messages(const Bench& bench) {
-  std::vector<Published> out;
-  for (const Published& s : bench.sent)
-    if (!s.channel.starts_with("RAW_") && !s.channel.starts_with("HEARTBEAT_") && !s.channel.starts_with("CONFIG_"))
-      out.push_back(s);
-  return out;
-}
+using test::replayed;
+using test::sensor_messages;
 
 DeviceConfig quick(const std::string& device) {
   DeviceConfig c;
@@ -361,51 +262,6 @@ TEST_CASE("NTRIP: corrections go to the receiver, its position to the caster") {
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   CHECK(caster.heard().starts_with("GET /NEAR HTTP/1.1"));
   CHECK(caster.heard().find("$GPGGA,") != std::string::npos);
-}
-
-TEST_CASE("pictures from files: JPEG out, the same again from the raw ones, one stamp for a pair") {
-  const test::TemporaryFolder folder;
-  for (int i = 0; i < 6; ++i) {
-    cv::Mat picture(48, 64, CV_8UC3, cv::Scalar(20 * i, 100, 200 - 10 * i));
-    REQUIRE(cv::imwrite((folder / ("frame_" + std::to_string(i) + ".png")).string(), picture));
-  }
-  CameraDriverConfig config;
-  const std::string pattern = (folder / "frame_%d.png").string();
-  config.devices = {pattern, pattern};
-  config.synchronised = true;
-  config.rate = 100.0;
-  config.publish_raw = true;
-  Bench bench(camera_driver_setup(config));
-  REQUIRE(bench.step_until([&] { return !bench.more; }));
-  CHECK(bench.count("CAMERA_LEFT") == 6);
-  CHECK(bench.count("CAMERA_RIGHT") == 6);
-  CHECK(bench.count("RAW_CAMERA_LEFT") == 7);  // with the opening
-  const std::vector<Published> live = sensor_messages(bench);
-  CHECK(replayed(bench) == live);
-  const image_t left = decode<image_t>(live[0].bytes), right = decode<image_t>(live[1].bytes);
-  CHECK(left.utime == right.utime);
-  CHECK(left.width_px == 64);
-  CHECK(left.format == image_t::FORMAT_JPEG);
-}
-
-TEST_CASE("pictures as bytes: PNM there and back, sizes of JPEG, and garbage") {
-  cv::Mat colour(5, 7, CV_8UC3);
-  for (int i = 0; i < 105; ++i) colour.data[i] = static_cast<uint8_t>(i * 37);
-  const cv::Mat gray = cv::Mat(5, 7, CV_8UC1, colour.data).clone();
-  for (const cv::Mat& picture : {colour, gray}) {
-    const Bytes bytes = write_pnm(picture);
-    const cv::Mat back = read_pnm(bytes);
-    REQUIRE(back.size() == picture.size());
-    REQUIRE(back.type() == picture.type());
-    CHECK(cv::norm(back, picture, cv::NORM_INF) == 0.0);
-    for (std::size_t n = 0; n < bytes.size(); ++n) CHECK(read_pnm({bytes.data(), n}).empty());
-  }
-  for (const std::string text : {"P6\n-1 5\n255\n", "P6\n99999 99999\n255\n", "P5\n1 1\n65535\nx", "P5\n"})
-    CHECK(read_pnm(test::bytes_of(text)).empty());
-  Bytes jpeg;
-  REQUIRE(cv::imencode(".jpg", colour, jpeg));
-  CHECK(read_jpeg_size(jpeg) == cv::Size(7, 5));
-  for (std::size_t n = 0; n < 40; ++n) static_cast<void>(read_jpeg_size({jpeg.data(), n}));
 }
 
 }  // namespace
