@@ -18,7 +18,7 @@ constexpr int64_t kStart_us = 1'700'000'000'000'000;
 struct Bench {
   MonitorHandler handler{MonitorConfig{}, Expectations{}};
   Board board{"x", true};
-  View view{board, handler.health(), 5.0, false};
+  DriveView view{board, handler.health(), 5.0, false};
   int64_t seq = 0;
 
   Bench() { handler.add(view); }
