@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 TEST_CASE("every vehicle under configs can be loaded") {
   std::set<fs::path> vehicles;
   for (const auto& entry : fs::directory_iterator(test::source_path("configs"))) {
-    if (entry.is_directory()) vehicles.insert(entry.path());
+    if (entry.is_directory() && entry.path().filename() != "systemd") vehicles.insert(entry.path());
   }
   CHECK(vehicles.size() >= 2);
   for (const fs::path& vehicle : vehicles) {
