@@ -110,7 +110,7 @@ void calibrate(const Options& options) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("calibrate", "Learn from a drive what the calibration leaves open");
+  CLI::App* command = app.add_subcommand("calibrate", "Fill in what the calibration leaves open");
   command->require_subcommand(1);
   CLI::App* camera_imu =
       command->add_subcommand("camera-imu", "Rotation and time offset of the left camera against the IMU");
@@ -122,6 +122,7 @@ void add_calibrate_command(CLI::App& app) {
       ->required();
   camera_imu->add_flag("--dry-run", options->dry, "print what was found and write nothing");
   camera_imu->callback([options] { calibrate(*options); });
+  add_kalibr_command(*command);
 }
 
 }  // namespace roadfix

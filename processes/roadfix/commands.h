@@ -1,4 +1,4 @@
-/// The subcommands of the tool: each adds itself to the application.
+/// The subcommands of the tool: each adds itself to the application (kalibr: to calibrate).
 #pragma once
 
 namespace CLI {
@@ -12,6 +12,7 @@ void add_doctor_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_export_command(CLI::App& app);
 void add_import_command(CLI::App& app);
+void add_kalibr_command(CLI::App& calibrate);
 void add_log_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_run_command(CLI::App& app);

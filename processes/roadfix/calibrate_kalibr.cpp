@@ -1,0 +1,39 @@
+// roadfix calibrate kalibr: takes the cameras of a Kalibr chain into a vehicle's calibration.
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include "config/config_error.h"
+#include "config/kalibr.h"
+#include "roadfix/commands.h"
+
+namespace roadfix {
+
+void add_kalibr_command(CLI::App& calibrate) {
+  struct Options {
+    std::filesystem::path chain, vehicle;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = calibrate.add_subcommand(
+      "kalibr", "Take lenses, places and time offset of the cameras from Kalibr's camchain-*.yaml");
+  command->add_option("chain", options->chain, "what Kalibr wrote")->required()->check(CLI::ExistingFile);
+  command->add_option("--config", options->vehicle, "the vehicle's folder; its calibration.yaml is rewritten")
+      ->required();
+  command->callback([options] {
+    const std::filesystem::path path = options->vehicle / "calibration.yaml";
+    Calibration calibration;
+    if (std::filesystem::exists(path)) calibration = load_calibration(options->vehicle);
+    take_kalibr(parse_kalibr(read_text_file(options->chain), options->chain.string()), calibration);
+    std::filesystem::create_directories(options->vehicle);
+    std::ofstream file(path, std::ios::binary);
+    file << calibration_text(calibration);
+    file.close();
+    if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+    std::cout << path.string() << "\n";
+  });
+}
+
+}  // namespace roadfix
