@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -109,11 +110,13 @@ void run(const Options& options) {
   std::cout << options.out.string() << ": " << config.name << ", seed " << options.seed << "\n" << summary;
   if (!options.vehicle.empty()) std::cout << "vehicle: " << options.vehicle.string() << "\n";
   if (options.timing) {
-    std::cout << fmt::format("{:.0f} s simulated and written in {:.2f} s: {:.0f} x real time\n", config.duration_s,
-                             taken_s, config.duration_s / taken_s);
+    const double cpu_s = static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+    std::cout << fmt::format("{:.0f} s simulated and written in {:.2f} s: {:.0f} x real time, {:.2f} s of CPU\n",
+                             config.duration_s, taken_s, config.duration_s / taken_s, cpu_s);
     if (!drive.exposures.empty())
-      std::cout << fmt::format("{} exposures: {:.2f} a second\n", drive.exposures.size(),
-                               static_cast<double>(drive.exposures.size()) / taken_s);
+      std::cout << fmt::format("{} exposures: {:.2f} a second, {:.4f} s of CPU each\n", drive.exposures.size(),
+                               static_cast<double>(drive.exposures.size()) / taken_s,
+                               cpu_s / static_cast<double>(drive.exposures.size()));
   }
 }
 
