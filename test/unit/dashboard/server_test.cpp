@@ -109,7 +109,7 @@ TEST_CASE("a client that takes nothing is dropped, and the others never notice")
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   CHECK(frames > 10);
-  CHECK(slowest < std::chrono::milliseconds(200));
+  CHECK(slowest < std::chrono::milliseconds(900));  // less than the stuck client is waited for
   stuck.until("never to be found", 3000);
   CHECK(stuck.closed());
   CHECK_FALSE(lively.closed());
