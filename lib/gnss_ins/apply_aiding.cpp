@@ -67,6 +67,16 @@ AidingRecord AidingApplier::apply_level(InsCore& core, const Pending& p, const G
   return core.fuse(AidingSource::kGnssPosition, p.t_us, level, gates.nis[2]);
 }
 
+AidingRecord AidingApplier::apply_height(InsCore& core, const Pending& p, const Gates& gates) const {
+  const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
+  Measurement<1> height;
+  height.residual = all.residual.tail<1>();
+  height.H = all.H.bottomRows<1>();
+  height.R = all.R.bottomRightCorner<1, 1>();
+  height.alike = p.alike;
+  return core.fuse(AidingSource::kGnssPosition, p.t_us, height, gates.nis[1]);
+}
+
 AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates& gates) const {
   const NavState& x = core.state();
   const double sigma = std::sqrt(p.cov(0, 0));

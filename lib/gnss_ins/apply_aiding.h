@@ -23,6 +23,7 @@ class AidingApplier {
   AidingRecord apply(InsCore& core, const Pending& p, const Gates& gates) const;
   /// Only the level part of a position.
   AidingRecord apply_level(InsCore& core, const Pending& p, const Gates& gates) const;
+  AidingRecord apply_height(InsCore& core, const Pending& p, const Gates& gates) const;
 
   /// Each learns its noise where `learns`.
   AidingRecord sideslip(InsCore& core, const Gates& gates, bool learns);

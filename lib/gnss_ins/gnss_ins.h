@@ -89,6 +89,7 @@ class GnssIns {
   void use_position(const Pending& measured);
   [[nodiscard]] bool agrees_with(AidingSource source, int64_t t_us) const;
   void recover(const Pending& p);
+  void refuse_height(const Pending& p);
   void align_again();
   [[nodiscard]] bool moved_meanwhile(double dt) const;
   [[nodiscard]] ImuNoise noise_over(double dt) const;
@@ -137,10 +138,11 @@ class GnssIns {
   JumpJudge jump_;
   int64_t agreed_since_us_ = 0;  // first position taken since the last start or recovery
   int64_t recovered_at_us_ = 0;
-  int64_t position_at_us_ = 0;    // stamp of the last position tried
-  double fix_interval_ = 1.0;     // s, between the last two that came without an outage
-  std::optional<SE3> abandoned_;  // last pose of a filter that was given up
-  bool lost_ = false;             // to be aligned again
+  int64_t height_refused_since_us_ = 0;  // 0: the last position agreed in height as well
+  int64_t position_at_us_ = 0;           // stamp of the last position tried
+  double fix_interval_ = 1.0;            // s, between the last two that came without an outage
+  std::optional<SE3> abandoned_;         // last pose of a filter that was given up
+  bool lost_ = false;                    // to be aligned again
   int reset_counter_ = 0;
   SE3 reset_delta_;
   int64_t bad_imu_ = 0, gaps_ = 0;

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kForwardSpan = 1.0;     // s that one transition of the forward covariance may cover
 constexpr double kCovarianceAge = 0.05;  // s that an output covariance may be used again
+constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is not used";
 
 // Covariance of pose and velocity at the true time of the output, (M.40)-(M.42).
 struct OutputCovariance {
@@ -124,6 +125,7 @@ GnssInsOutput GnssIns::output() {
     out.odometry.validity = s.coasting || unseen_ ? Validity::kCoasting : Validity::kValid;
     if (s.coasting) out.reason = "coasting without GNSS";
     if (unseen_) out.reason = "from the place where it was parked, without GNSS yet";
+    if (height_refused_since_us_ != 0) out.reason = kHeightContradicts;
     if (s.imu_frozen) out.reason = "IMU readings do not change";
   }
   return out;
@@ -135,6 +137,7 @@ GnssInsStatus GnssIns::status() const {
   s.waits_for = waiting_for(phase_, last_step_us_ != 0, fix_.has_value());
   s.gnss_quality = screen_.quality();
   s.gnss_reason = screen_.reason();
+  if (s.gnss_reason.empty() && height_refused_since_us_ != 0) s.gnss_reason = kHeightContradicts;
   s.bad_imu_samples = bad_imu_;
   s.imu_gaps = gaps_;
   s.imu_frozen = monitor_.frozen();

@@ -67,7 +67,12 @@ void GnssIns::use_position(const Pending& measured) {
   if (!jumped && !dragged) quality.noise.learn(r);
   if (r.status == AidingStatus::kGated) {
     const AidingRecord level = applier_.apply_level(*core_, p, gates_);
-    if (level.status == AidingStatus::kAccepted) r = level;
+    if (level.status == AidingStatus::kAccepted) {
+      r = level;
+      refuse_height(p);
+    }
+  } else if (r.status == AidingStatus::kAccepted) {
+    height_refused_since_us_ = 0;
   }
   quality.correlation.learn(r, p.cov.diagonal(), p.alike);
   if (r.status == AidingStatus::kAccepted) {
@@ -111,6 +116,27 @@ void GnssIns::recover(const Pending& p) {
   reset_delta_.q = before.q_enu_imu.conjugate() * after.q_enu_imu;
   refused_ = 0;
   jump_ = JumpJudge();
+}
+
+/// The height alone contradicts: a receiver that counts from another surface, or a filter that began on it. As nobody
+/// else knows heights, the receiver is right in the end.
+void GnssIns::refuse_height(const Pending& p) {
+  if (height_refused_since_us_ == 0) height_refused_since_us_ = p.t_us;
+  if (seconds_between(height_refused_since_us_, p.t_us) < config_.alignment.jump_s) return;
+  const NavState before = core_->state();
+  ErrorMatrix P = core_->covariance();
+  for (const auto& [index, variance] : {std::pair{kPos + 2, 1e4}, std::pair{kVel + 2, 4.0}}) {
+    P.row(index).setZero();
+    P.col(index).setZero();
+    P(index, index) = variance;
+  }
+  core_->initialise(before, P);
+  (void)applier_.apply_height(*core_, p, no_gates_);
+  ++reset_counter_;
+  reset_delta_ = {};
+  reset_delta_.p = core_->state().position - before.position;
+  reset_delta_.q = before.q_enu_imu.conjugate() * core_->state().q_enu_imu;
+  height_refused_since_us_ = 0;
 }
 
 bool GnssIns::moved_meanwhile(double dt) const {

@@ -180,6 +180,27 @@ TEST_CASE("a height above mean sea level, 40 m off, costs the height and not the
   for (size_t i = fix_at(s, 48.0); i < s.gnss.size(); ++i) move(s.gnss[i], {0.0, 0.0, 40.0});
   const Final f = drive_it(drive(), s);
   CHECK(f.error.head<2>().norm() < 0.2);
+  CHECK(f.output.reason == "the height of GNSS contradicts and is not used");
+  CHECK(f.status.gnss_reason == f.output.reason);
+  CHECK(f.output.reset_counter == 0);
+  CHECK(drive_it(drive(), test::Samples(drive())).output.reason.empty());
+}
+
+TEST_CASE("a height that stays another one is taken in the end, as a reset of the height alone") {
+  test::Samples s(drive());
+  for (size_t i = fix_at(s, 40.0); i < s.gnss.size(); ++i) move(s.gnss[i], {0.0, 0.0, 40.0});
+  GnssInsConfig config = test::filter_config(drive().config);
+  config.alignment.jump_s = 10.0;
+  GnssIns filter(config);
+  test::run(filter, s, [](GnssIns& f, int64_t) { f.clear_records(); });
+  const GnssInsOutput o = filter.output();
+  const Eigen::Matrix<double, 9, 1> e = test::error_of(filter, o.odometry, drive());
+  CHECK(o.reason.empty());
+  CHECK(o.reset_counter == 1);
+  CHECK(std::abs(o.reset_delta.p.z() - 40.0) < 1.0);
+  CHECK(o.reset_delta.p.head<2>().norm() < 0.1);
+  CHECK(std::abs(e(2) + 40.0) < 0.5);
+  CHECK(e.head<2>().norm() < 0.2);
 }
 
 TEST_CASE("a fix of a kilometre's sigma has no effect") {
