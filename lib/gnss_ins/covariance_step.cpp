@@ -7,20 +7,26 @@
 
 namespace roadfix {
 
-void TransitionSums::add(const Eigen::Matrix3d& R, const Eigen::Vector3d& dv, const InertialStep& step,
+void TransitionSums::add(const PaddedRotation& R, const Eigen::Vector3d& dv, const InertialStep& step,
                          double gyro_density, double accel_density) {
   const double dt = step.dt;
-  RotationBlocks now;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector4d axis(R(0, i), R(1, i), R(2, i), 0.0);
-    now.col(i) = axis;
-    now.col(3 + i) = step.specific_force(i) * axis;
-    now.col(6 + i) = step.rate(i) * axis;
-  }
+  // In the middle of the step: R (I + [h]x).
+  const Eigen::Vector3d h = (0.5 * dt) * step.rate;
+  const Eigen::Vector4d axes[] = {R.col(0) + h.z() * R.col(1) - h.y() * R.col(2),
+                                  R.col(1) + h.x() * R.col(2) - h.z() * R.col(0),
+                                  R.col(2) + h.y() * R.col(0) - h.x() * R.col(1)};
   position_change += dt * (velocity_change + 0.5 * dv);
   velocity_change += dv;
-  integral += dt * (sum + (0.5 * dt) * now);
-  sum += dt * now;
+  const auto collect = [&](int column, const Eigen::Vector4d& axis, double factor) {
+    const Eigen::Vector4d now = (dt * factor) * axis;
+    integral.col(column) += dt * (sum.col(column) + 0.5 * now);
+    sum.col(column) += now;
+  };
+  for (int i = 0; i < 3; ++i) {
+    collect(i, axes[i], 1.0);
+    collect(3 + i, axes[i], step.specific_force(i));
+    collect(6 + i, axes[i], step.rate(i));
+  }
   gyro_variance += gyro_density * gyro_density * dt;
   accel_variance += accel_density * accel_density * dt;
   duration += dt;
@@ -31,33 +37,35 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
   const Eigen::Matrix3d force = s.sum.block<3, 3>(0, 3), force2 = s.integral.block<3, 3>(0, 3);
   const Eigen::Matrix3d rate = s.sum.block<3, 3>(0, 6);
   const Eigen::Matrix3d turn = skew(earth_rate * s.duration);
-  const Eigen::Matrix3d dv_cross = skew(s.velocity_change);
-  const Eigen::Matrix3d dp_cross = skew(s.position_change);
-  moved.setZero();
-  moved.block<3, 3>(kPos, kPos).setIdentity();
-  moved.block<3, 3>(kPos, kVel) = s.duration * (Eigen::Matrix3d::Identity() - turn);
-  moved.block<3, 3>(kVel, kVel) = Eigen::Matrix3d::Identity() - 2.0 * turn;
-  moved.block<3, 3>(kAtt, kAtt) = Eigen::Matrix3d::Identity() - turn;
-  moved.block<3, 3>(kPos, kAtt) = -dp_cross;
-  moved.block<3, 3>(kVel, kAtt) = -dv_cross;
+  moved_by.setZero();
+  const auto block = [&](int row, int column) { return moved_by.block<3, 3>(column, row).transpose(); };
+  block(kPos, kPos).setIdentity();
+  block(kPos, kVel) = s.duration * (Eigen::Matrix3d::Identity() - turn);
+  block(kVel, kVel) = Eigen::Matrix3d::Identity() - 2.0 * turn;
+  block(kAtt, kAtt) = Eigen::Matrix3d::Identity() - turn;
+  block(kPos, kAtt) = skew(-s.position_change);
+  block(kVel, kAtt) = skew(-s.velocity_change);
   // A gyro error turns the attitude in proportion to time, and that turns the specific force: half of the product for
   // the velocity, a third for the position, exact for constant motion within the step.
-  moved.block<3, 3>(kAtt, kGyroBias) = -rotation;
-  moved.block<3, 3>(kAtt, kGyroScale) = -rate;
-  moved.block<3, 3>(kVel, kGyroBias) = 0.5 * dv_cross * rotation;
-  moved.block<3, 3>(kVel, kGyroScale) = 0.5 * dv_cross * rate;
-  moved.block<3, 3>(kVel, kAccelBias) = -rotation;
-  moved.block<3, 3>(kVel, kAccelScale) = -force;
-  moved.block<3, 3>(kPos, kGyroBias) = dp_cross * rotation / 3.0;
-  moved.block<3, 3>(kPos, kGyroScale) = dp_cross * rate / 3.0;
-  moved.block<3, 3>(kPos, kAccelBias) = -rotation2;
-  moved.block<3, 3>(kPos, kAccelScale) = -force2;
+  block(kAtt, kGyroBias) = -rotation;
+  block(kAtt, kGyroScale) = -rate;
+  block(kVel, kAccelBias) = -rotation;
+  block(kVel, kAccelScale) = -force;
+  const Eigen::Vector3d half_dv = 0.5 * s.velocity_change, third_dp = s.position_change / 3.0;
+  for (int i = 0; i < 3; ++i) {
+    block(kVel, kGyroBias).col(i) = half_dv.cross(rotation.col(i));
+    block(kVel, kGyroScale).col(i) = half_dv.cross(rate.col(i));
+    block(kPos, kGyroBias).col(i) = third_dp.cross(rotation.col(i));
+    block(kPos, kGyroScale).col(i) = third_dp.cross(rate.col(i));
+  }
+  block(kPos, kAccelBias) = -rotation2;
+  block(kPos, kAccelScale) = -force2;
 
   decay.setOnes();
   noise.setZero();
   const GnssInsVehicle& v = config.vehicle;
   const PropagationConfig& p = config.propagation;
-  const double fade = std::exp(-s.duration / v.correlation_s);  // first-order Gauss-Markov, (M.14)
+  const double fade = fading(s.duration, v.correlation_s);  // first-order Gauss-Markov, (M.14)
   decay.segment<12>(kGyroBias).setConstant(fade);
   const double gain = 1.0 - fade * fade;
   noise.segment<3>(kGyroBias).setConstant(gain * v.gyro_bias_std * v.gyro_bias_std);
@@ -74,7 +82,7 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
 
 ErrorMatrix Transition::dense() const {
   ErrorMatrix phi = decay.asDiagonal();
-  phi.topLeftCorner<9, kInertialStates>() = moved;
+  phi.topLeftCorner<9, kInertialStates>() = moved_by.topRows<kInertialStates>().transpose();
   return phi;
 }
 
@@ -83,14 +91,18 @@ namespace {
 using Packet = Eigen::internal::packet_traits<double>::type;  // one vector register
 constexpr int kLanes = Eigen::internal::packet_traits<double>::size;
 
-/// Columns, of `Rows` numbers each, of the product of a matrix with the rows of `moved`: one column of the result at a
-/// time, held in registers.
-template <int Rows, int... Lane>
+/// P Phi', its columns of position, velocity and attitude.
+using Moved = Eigen::Matrix<double, kStates, 9>;
+
+/// P is symmetric, so its columns are its rows: one column of the result at a time, held in registers.
+template <int... Lane>
 class MovedColumns {
  public:
-  MovedColumns(const double* columns, const Transition& phi) : columns_(columns), phi_(phi) {}
+  MovedColumns(const ErrorMatrix& P, const Transition& phi) : P_(P), phi_(phi) {
+    static_assert(sizeof...(Lane) * kLanes == kStates);
+  }
 
-  void write(double* to) const {
+  void write(Moved& to) const {
     for (int row = 0; row < 9; ++row) {
       Packet sum[] = {(static_cast<void>(Lane), Eigen::internal::pset1<Packet>(0.0))...};
       if (row < kVel) {
@@ -102,71 +114,81 @@ class MovedColumns {
         add(sum, row, kAtt, kAccelBias);
         add(sum, row, kGyroScale, kAccelScale);
       }
-      (Eigen::internal::pstore(to + Rows * row + kLanes * Lane, sum[Lane]), ...);
+      (Eigen::internal::pstore(&to(kLanes * Lane, row), sum[Lane]), ...);
     }
   }
 
  private:
   void add(Packet (&sum)[sizeof...(Lane)], int row, int first, int last) const {
     for (int k = first; k < last; ++k) {
-      const Packet factor = Eigen::internal::pset1<Packet>(phi_.moved(row, k));
-      const double* column = columns_ + Rows * k;
-      ((sum[Lane] = Eigen::internal::pmadd(factor, Eigen::internal::pload<Packet>(column + kLanes * Lane), sum[Lane])),
+      const Packet factor = Eigen::internal::pset1<Packet>(phi_.moved_by(k, row));
+      ((sum[Lane] = Eigen::internal::pmadd(factor, Eigen::internal::pload<Packet>(&P_(kLanes * Lane, k)), sum[Lane])),
        ...);
     }
   }
 
-  const double* columns_;
+  const ErrorMatrix& P_;
   const Transition& phi_;
 };
 
-template <int Rows, int... Lane>
-void write_moved(const double* columns, const Transition& phi, double* to, std::integer_sequence<int, Lane...>) {
-  MovedColumns<Rows, Lane...>(columns, phi).write(to);
+template <int... Lane>
+void write_moved(const ErrorMatrix& P, const Transition& phi, Moved& to, std::integer_sequence<int, Lane...>) {
+  MovedColumns<Lane...>(P, phi).write(to);
 }
 
-/// columns * moved', written to `to`; both aligned, with columns of `Rows` numbers.
-template <int Rows>
-void times_moved(const double* columns, const Transition& phi, double* to) {
-  static_assert(Rows % kLanes == 0);
-  write_moved<Rows>(columns, phi, to, std::make_integer_sequence<int, Rows / kLanes>());
+Moved moved_columns(const ErrorMatrix& P, const Transition& phi) {
+  Moved moved;
+  write_moved(P, phi, moved, std::make_integer_sequence<int, kStates / kLanes>());
+  return moved;
+}
+
+/// Phi (P Phi') of position, velocity and attitude, with the white noise of the sensors.
+Eigen::Matrix<double, 9, 9> moved_block(const Moved& moved, const Transition& phi, const TransitionSums& sums) {
+  Eigen::Matrix<double, 9, 9> out;
+  for (int j = 0; j < 9; ++j)
+    for (int i = j; i < 9; ++i)
+      out(i, j) = out(j, i) = phi.moved_by.col(i).dot(moved.col(j).head<kInertialStates + 3>());
+
+  // White noise over the step, (M.15); its share in the position is below a micrometre at 20 Hz but keeps the block
+  // positive definite.
+  const double T = sums.duration;
+  for (int i = 0; i < 3; ++i) {
+    out(kAtt + i, kAtt + i) += sums.gyro_variance;
+    out(kVel + i, kVel + i) += sums.accel_variance;
+    out(kPos + i, kPos + i) += sums.accel_variance * T * T / 3.0;
+    out(kPos + i, kVel + i) += sums.accel_variance * T / 2.0;
+    out(kVel + i, kPos + i) += sums.accel_variance * T / 2.0;
+  }
+  return out;
 }
 
 }  // namespace
 
-void propagate_covariance(ErrorMatrix& P, const Transition& phi, const TransitionSums& sums) {
-  // P is symmetric, so its columns are its rows: P Phi' first, nine columns of it.
-  Eigen::Matrix<double, kStates, 9> moved;
-  times_moved<kStates>(P.data(), phi, moved.data());
-  // Then Phi (P Phi'), by the same sums on the transpose.
-  Eigen::Matrix<double, 12, kInertialStates> rows = Eigen::Matrix<double, 12, kInertialStates>::Zero();
-  rows.topRows<9>() = moved.topRows<kInertialStates>().transpose();
-  Eigen::Matrix<double, 12, 9> both;
-  times_moved<12>(rows.data(), phi, both.data());
-  const auto A = both.topRows<9>();
-
+void propagate_covariance(const ErrorMatrix& P, const Transition& phi, const TransitionSums& sums, ErrorMatrix& after) {
   constexpr int kRest = kStates - 9;
-  constexpr int kFading = kInertialStates - 9;  // the others keep their value
-  P.topLeftCorner<9, 9>() = 0.5 * (A + A.transpose());
-  const Eigen::Matrix<double, kRest, 1> decay = phi.decay.tail<kRest>();
-  P.bottomLeftCorner<kRest, 9>() = moved.bottomRows<kRest>().array().colwise() * decay.array();
-  P.topRightCorner<9, kRest>() = P.bottomLeftCorner<kRest, 9>().transpose();
+  constexpr int kAligned = 8;  // where whole registers of a column begin
+  const Moved moved = moved_columns(P, phi);
   // Products of the two factors commute, so the block stays symmetric to the last bit.
-  for (int j = 0; j < kFading; ++j) P.block<kRest, 1>(9, 9 + j).array() *= decay(j) * decay.array();
-  for (int j = kFading; j < kRest; ++j)
-    P.block<kFading, 1>(9, 9 + j).array() *= decay(j) * decay.head<kFading>().array();
-  P.diagonal() += phi.noise;
-
-  // White noise of the sensors over the step, (M.15); its share in the position is below a micrometre at 20 Hz but
-  // keeps the block positive definite.
-  const double T = sums.duration;
-  for (int i = 0; i < 3; ++i) {
-    P(kAtt + i, kAtt + i) += sums.gyro_variance;
-    P(kVel + i, kVel + i) += sums.accel_variance;
-    P(kPos + i, kPos + i) += sums.accel_variance * T * T / 3.0;
-    P(kPos + i, kVel + i) += sums.accel_variance * T / 2.0;
-    P(kVel + i, kPos + i) += sums.accel_variance * T / 2.0;
+  for (int j = 9; j < kStates; ++j) {
+    const double factor = phi.decay(j);
+    after.col(j).tail<kStates - kAligned>() =
+        P.col(j).tail<kStates - kAligned>().cwiseProduct(factor * phi.decay.tail<kStates - kAligned>());
+    after(j, j) += phi.noise(j);
   }
+  for (int j = 0; j < 9; ++j)
+    after.col(j).tail<kRest>() = moved.col(j).tail<kRest>().cwiseProduct(phi.decay.tail<kRest>());
+  after.topRightCorner<9, kRest>() = after.bottomLeftCorner<kRest, 9>().transpose();
+  after.topLeftCorner<9, 9>() = moved_block(moved, phi, sums);
+}
+
+OutputErrorMatrix propagate_output_covariance(const ErrorMatrix& P, const Transition& phi, const TransitionSums& sums) {
+  const Moved moved = moved_columns(P, phi);
+  OutputErrorMatrix out;
+  out.topLeftCorner<9, 9>() = moved_block(moved, phi, sums);
+  out.topRightCorner<9, 1>() = phi.decay(kImuOffset) * moved.row(kImuOffset).transpose();
+  out.bottomLeftCorner<1, 9>() = out.topRightCorner<9, 1>().transpose();
+  out(9, 9) = phi.decay(kImuOffset) * phi.decay(kImuOffset) * P(kImuOffset, kImuOffset) + phi.noise(kImuOffset);
+  return out;
 }
 
 }  // namespace roadfix

@@ -8,8 +8,8 @@
 
 namespace roadfix {
 
-/// R, R diag(f), R diag(rate) below each other's columns, with a row of zeros: as one aligned array, because they are
-/// summed at every sample.
+/// The three columns of R, R diag(f), R diag(rate) beside each other, with a row of zeros: as one aligned array,
+/// because they are summed at every sample.
 using RotationBlocks = Eigen::Matrix<double, 4, 9>;
 
 /// What the transition matrix needs of the samples since the last covariance step.
@@ -27,22 +27,29 @@ struct TransitionSums {
     a(duration, velocity_change, position_change, sum, integral, gyro_variance, accel_variance);
   }
 
-  /// R: imu to enu in the middle of the step; `dv` what its specific force gave, m/s, enu axes.
-  void add(const Eigen::Matrix3d& R, const Eigen::Vector3d& dv, const InertialStep& step, double gyro_density,
+  /// R: imu to enu where the step begins; `dv` what its specific force gave, m/s, enu axes.
+  void add(const PaddedRotation& R, const Eigen::Vector3d& dv, const InertialStep& step, double gyro_density,
            double accel_density);
 };
 
 /// The transition matrix, (M.12): nine rows that other states move, and the diagonal of the rest.
 struct Transition {
-  Eigen::Matrix<double, 9, kInertialStates> moved;  ///< position, velocity, attitude
-  ErrorVector decay;                                ///< diagonal of the states that are not moved by others
-  ErrorVector noise;                                ///< their variance added
+  /// Position, velocity, attitude: each column is one of their rows, with zeros up to whole vector registers.
+  Eigen::Matrix<double, kInertialStates + 3, 9> moved_by;
+  ErrorVector decay;  ///< diagonal of the states that are not moved by others
+  ErrorVector noise;  ///< their variance added
 
   Transition(const TransitionSums& sums, const Eigen::Vector3d& earth_rate, const GnssInsConfig& config);
   [[nodiscard]] ErrorMatrix dense() const;  ///< the whole matrix, for tests
 };
 
-/// P = Phi P Phi' + Q, symmetric to the last bit.
-void propagate_covariance(ErrorMatrix& P, const Transition& phi, const TransitionSums& sums);
+/// after = Phi P Phi' + Q, symmetric to the last bit; P and `after` may be the same.
+void propagate_covariance(const ErrorMatrix& P, const Transition& phi, const TransitionSums& sums, ErrorMatrix& after);
+
+/// Covariance of position, velocity, attitude and the IMU's clock offset.
+using OutputErrorMatrix = Eigen::Matrix<double, 10, 10>;
+
+/// The same, of these states only.
+OutputErrorMatrix propagate_output_covariance(const ErrorMatrix& P, const Transition& phi, const TransitionSums& sums);
 
 }  // namespace roadfix

@@ -67,9 +67,10 @@ InputStatus GnssIns::advance(const ImuSample& imu) {
 
 void GnssIns::note(AidingRecord record, int64_t id) {
   record.id = id;
-  if (record.status == AidingStatus::kAccepted || record.status == AidingStatus::kReset)
+  if (record.status == AidingStatus::kAccepted || record.status == AidingStatus::kReset) {
     used_at_us_[static_cast<size_t>(record.source)] = record.t_us;
-  forward_stale_ = true;
+    forward_stale_ = true;
+  }
   if (records_.size() < records_.capacity()) records_.push_back(record);
 }
 

@@ -87,6 +87,8 @@ class GnssIns {
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
   void use_position(const Pending& measured);
+  /// While coasting: when position or zero velocity was last used.
+  [[nodiscard]] std::optional<int64_t> coasting_since() const;
   [[nodiscard]] bool agrees_with(AidingSource source, int64_t t_us) const;
   void recover(const Pending& p);
   void refuse_height(const Pending& p);
@@ -132,7 +134,6 @@ class GnssIns {
   Geodetic last_fix_;
   std::optional<double> wheel_speed_;
   std::array<int64_t, kAidingSources> used_at_us_{};
-  int64_t coasting_since_us_ = 0;
   int64_t refused_since_us_ = 0;
   int refused_ = 0;
   JumpJudge jump_;

@@ -1,4 +1,5 @@
 // What is published: the state carried forward to the newest IMU sample, and the status in words.
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/so3.h"
@@ -17,32 +18,23 @@ struct OutputCovariance {
   Matrix6d pose;
   Eigen::Matrix3d velocity;
 
-  OutputCovariance(const NavState& x, const BodyMotion& m, const ErrorMatrix& P) {
-    // Position and velocity at the true time, rotation in imu axes, velocity in imu axes: each is three of the rows of
-    // J, of which only these blocks are not zero.
+  OutputCovariance(const NavState& x, const BodyMotion& m, const OutputErrorMatrix& P) {
+    // Position and velocity at the true time, rotation in imu axes, velocity in imu axes. Three rows of zeros make a
+    // column whole vector registers.
     const Eigen::Matrix3d Rt = x.q_enu_imu.toRotationMatrix().transpose();
-    const Eigen::Matrix3d turned = Rt * skew(x.velocity);
-    Eigen::Matrix<double, 10, 10> used;
-    used.topLeftCorner<9, 9>() = P.topLeftCorner<9, 9>();
-    used.topRightCorner<9, 1>() = P.block<9, 1>(0, kImuOffset);
-    used.bottomLeftCorner<1, 9>() = P.block<1, 9>(kImuOffset, 0);
-    used(9, 9) = P(kImuOffset, kImuOffset);
-    const auto rows = [&](const auto& of) {
-      Eigen::Matrix<double, 9, 10> out;
-      out.middleRows<3>(0) = of.template middleRows<3>(kPos) + x.imu_offset * of.template middleRows<3>(kVel);
-      out.middleRows<3>(0) += (x.velocity + x.imu_offset * m.acceleration).lazyProduct(of.row(9));
-      out.middleRows<3>(3) = Rt.lazyProduct(of.template middleRows<3>(kAtt));
-      out.middleRows<3>(3) += m.rate.lazyProduct(of.row(9));
-      out.middleRows<3>(6) = Rt.lazyProduct(of.template middleRows<3>(kVel));
-      out.middleRows<3>(6) += turned.lazyProduct(of.template middleRows<3>(kAtt));
-      out.middleRows<3>(6) += (Rt * m.acceleration).lazyProduct(of.row(9));
-      return out;
-    };
-    Eigen::Matrix<double, 10, 10> half = Eigen::Matrix<double, 10, 10>::Zero();
-    half.leftCols<9>() = rows(used).transpose();
-    const Eigen::Matrix<double, 9, 9> all = rows(half).leftCols<9>();
+    Eigen::Matrix<double, 12, 10> J = Eigen::Matrix<double, 12, 10>::Zero();
+    J.block<3, 3>(0, kPos).setIdentity();
+    J.block<3, 3>(0, kVel) = x.imu_offset * Eigen::Matrix3d::Identity();
+    J.block<3, 1>(0, 9) = x.velocity + x.imu_offset * m.acceleration;
+    J.block<3, 3>(3, kAtt) = Rt;
+    J.block<3, 1>(3, 9) = m.rate;
+    J.block<3, 3>(6, kVel) = Rt;
+    for (int i = 0; i < 3; ++i) J.block<1, 3>(6 + i, kAtt) = Rt.row(i).cross(x.velocity);
+    J.block<3, 1>(6, 9) = Rt.lazyProduct(m.acceleration);
+    const Eigen::Matrix<double, 12, 10> half = J.lazyProduct(P);
+    const Eigen::Matrix<double, 12, 12> all = half.lazyProduct(J.transpose());
     pose = 0.5 * (all.topLeftCorner<6, 6>() + all.topLeftCorner<6, 6>().transpose());
-    velocity = 0.5 * (all.bottomRightCorner<3, 3>() + all.bottomRightCorner<3, 3>().transpose());
+    velocity = 0.5 * (all.block<3, 3>(6, 6) + all.block<3, 3>(6, 6).transpose());
   }
 };
 
@@ -107,7 +99,7 @@ GnssInsOutput GnssIns::output() {
   out.odometry.velocity = T.q.conjugate() * v;
   out.odometry.angular_rate = m.rate;
   if (cov_at_us_ == 0 || seconds_between(cov_at_us_, x.t_us) >= kCovarianceAge) {
-    const OutputCovariance cov(x, m, forward_->covariance());
+    const OutputCovariance cov(x, m, forward_->output_covariance());
     cov_pose_ = cov.pose;
     cov_velocity_ = cov.velocity;
     cov_at_us_ = x.t_us;
@@ -115,20 +107,28 @@ GnssInsOutput GnssIns::output() {
   out.odometry.cov_pose = cov_pose_;
   out.odometry.cov_velocity = cov_velocity_;
 
-  const GnssInsStatus s = status();
   const double horizontal = std::sqrt(cov_pose_(0, 0) + cov_pose_(1, 1));
   if (phase_ != AlignmentPhase::kDone) {
-    out.reason = "waits for " + s.waits_for;
+    out.reason = std::string("waits for ") + waiting_for(phase_, last_step_us_ != 0, fix_.has_value());
   } else if (!(horizontal < config_.alignment.invalid_sigma_m)) {
     out.reason = "position too uncertain";
   } else {
-    out.odometry.validity = s.coasting || unseen_ ? Validity::kCoasting : Validity::kValid;
-    if (s.coasting) out.reason = "coasting without GNSS";
+    const bool coasting = coasting_since().has_value();
+    out.odometry.validity = coasting || unseen_ ? Validity::kCoasting : Validity::kValid;
+    if (coasting) out.reason = "coasting without GNSS";
     if (unseen_) out.reason = "from the place where it was parked, without GNSS yet";
     if (height_refused_since_us_ != 0) out.reason = kHeightContradicts;
-    if (s.imu_frozen) out.reason = "IMU readings do not change";
+    if (monitor_.frozen()) out.reason = "IMU readings do not change";
   }
   return out;
+}
+
+std::optional<int64_t> GnssIns::coasting_since() const {
+  const auto used_at = [&](AidingSource source) { return used_at_us_[static_cast<size_t>(source)]; };
+  const int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
+  const bool coasting =
+      phase_ == AlignmentPhase::kDone && seconds_between(anchored, last_step_us_) > config_.alignment.coasting_s;
+  return coasting ? std::optional(anchored) : std::nullopt;
 }
 
 GnssInsStatus GnssIns::status() const {
@@ -142,17 +142,10 @@ GnssInsStatus GnssIns::status() const {
   s.imu_gaps = gaps_;
   s.imu_frozen = monitor_.frozen();
   const double hold = config_.alignment.coasting_s;
-  int64_t anchored = 0;
-  for (size_t i = 0; i < kAidingSources; ++i) {
-    const int64_t at = used_at_us_[i];
-    if (at == 0) continue;
-    if (seconds_between(at, last_step_us_) <= hold) s.aided_by |= 1 << i;
-    const auto source = static_cast<AidingSource>(i);
-    if (source == AidingSource::kGnssPosition || source == AidingSource::kZeroVelocity)
-      anchored = std::max(anchored, at);
-  }
-  s.coasting = phase_ == AlignmentPhase::kDone && seconds_between(anchored, last_step_us_) > hold;
-  s.coasting_since_us = s.coasting ? anchored : 0;
+  for (size_t i = 0; i < kAidingSources; ++i)
+    if (used_at_us_[i] != 0 && seconds_between(used_at_us_[i], last_step_us_) <= hold) s.aided_by |= 1 << i;
+  s.coasting = coasting_since().has_value();
+  s.coasting_since_us = coasting_since().value_or(0);
   return s;
 }
 

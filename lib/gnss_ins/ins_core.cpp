@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/so3.h"
-
 namespace roadfix {
 
 namespace {
@@ -26,29 +24,32 @@ void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
 
 void InsCore::predict(const ImuSample& imu, double dt, const ImuNoise& noise) {
   const InertialStep step = corrected(x_, imu, dt);
-  const Eigen::Matrix3d R = x_.q_enu_imu.toRotationMatrix();
+  const PaddedRotation R = padded_rotation(x_.q_enu_imu);
   const Eigen::Vector3d v_before = x_.velocity;
   const Eigen::Vector3d dv = mechanise(x_, R, last_, step, earth_);
-  sums_.add(R + R * skew(0.5 * dt * step.rate), dv, step, noise.gyro, noise.accel);
+  sums_.add(R, dv, step, noise.gyro, noise.accel);
   x_.t_us = imu.t_us;
-  // exp(-x) to x^3 / 6, where x, samples over an hour, is 1e-5.
-  const double share = dt / config_.vehicle.correlation_s;
-  const double fade = share < 1e-3 ? 1.0 - share + 0.5 * share * share : std::exp(-share);
+  const double fade = fading(dt, config_.vehicle.correlation_s);
   x_.gyro_bias *= fade;
   x_.accel_bias *= fade;
   x_.gyro_scale *= fade;
   x_.accel_scale *= fade;
   const double weight = last_.dt > 0.0 ? dt / (dt + kMotionTime) : 1.0;
-  motion_.rate += weight * (step.rate - R.transpose() * earth_.rate() - motion_.rate);
-  motion_.acceleration += weight * ((x_.velocity - v_before) / dt - motion_.acceleration);
+  motion_.rate += weight * (step.rate - R.topRows<3>().transpose().lazyProduct(earth_.rate()) - motion_.rate);
+  motion_.acceleration += weight * ((1.0 / dt) * (x_.velocity - v_before) - motion_.acceleration);
   last_ = step;
   if (!ahead_ && sums_.duration >= config_.propagation.covariance_interval - 1e-9) flush();
 }
 
 ErrorMatrix InsCore::covariance() const {
-  ErrorMatrix P = P_;
-  if (sums_.duration > 0.0) propagate_covariance(P, Transition(sums_, earth_.rate(), config_), sums_);
+  if (sums_.duration <= 0.0) return P_;
+  ErrorMatrix P;
+  propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_, P);
   return P;
+}
+
+OutputErrorMatrix InsCore::output_covariance() const {
+  return propagate_output_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_);
 }
 
 double InsCore::longest_age() const {
@@ -62,7 +63,7 @@ double InsCore::longest_age() const {
 }
 
 void InsCore::flush() {
-  propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_);
+  propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_, P_);
   sums_ = TransitionSums();
 }
 

@@ -36,27 +36,27 @@ class InsCore {
   /// Uses m unless its normalised innovation squared exceeds `gate`.
   template <int Rows>
   AidingRecord fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
-    const ErrorMatrix P_now = covariance();
-    const Innovation<Rows> innovation(P_now, m);
+    ErrorMatrix moved;
+    const bool moves = sums_.duration > 0.0;
+    if (moves) propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_, moved);
+    Innovation<Rows> innovation(moves ? moved : P_, m);
     AidingRecord record = record_of(source, t_us, m, innovation);
     record.status = !innovation.usable       ? AidingStatus::kBadInput
                     : innovation.nis <= gate ? AidingStatus::kAccepted
                                              : AidingStatus::kGated;
     if (record.status != AidingStatus::kAccepted) return record;
-    P_ = P_now;
-    sums_ = TransitionSums();
-    if (m.alike > 1.0) {
-      Measurement<Rows> weaker = m;
-      weaker.R *= m.alike;
-      Innovation<Rows>(P_, weaker).apply(x_, P_, weaker, considered_);
-    } else {
-      innovation.apply(x_, P_, m, considered_);
+    if (moves) {
+      P_ = moved;
+      sums_ = TransitionSums();
     }
+    if (m.alike > 1.0) innovation.weigh(m.residual, m.alike * m.R);
+    innovation.apply(x_, P_, considered_);
     return record;
   }
 
   [[nodiscard]] const NavState& state() const { return x_; }
-  [[nodiscard]] ErrorMatrix covariance() const;  ///< at the state's epoch
+  [[nodiscard]] ErrorMatrix covariance() const;               ///< at the state's epoch
+  [[nodiscard]] OutputErrorMatrix output_covariance() const;  ///< likewise, of what an output needs
   /// rad, as of the last covariance step.
   [[nodiscard]] double heading_std() const { return std::sqrt(P_(kAtt + 2, kAtt + 2)); }
   /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.

@@ -53,35 +53,64 @@ struct StateRange {
 
 /// Innovation statistics of a measurement under P, without using it.
 template <int Rows>
-struct Innovation {
-  Eigen::Matrix<double, kStates, Rows> PHt;
-  Eigen::LLT<Eigen::Matrix<double, Rows, Rows>> S;
-  Eigen::Matrix<double, Rows, 1> variance;
-  double nis = 0.0;
-  double log_likelihood = 0.0;
-  bool usable = false;  ///< S positive definite and everything finite
+class Innovation {
+ public:
+  using Small = Eigen::Matrix<double, Rows, Rows>;
+  using Residual = Eigen::Matrix<double, Rows, 1>;
 
   Innovation(const ErrorMatrix& P, const Measurement<Rows>& m) {
-    PHt.noalias() = P.lazyProduct(m.H.transpose());
-    const Eigen::Matrix<double, Rows, Rows> s = m.H.lazyProduct(PHt) + m.R;
-    variance = s.diagonal();
-    S.compute(s);
-    if (S.info() != Eigen::Success || !s.allFinite() || !m.residual.allFinite()) return;
-    const Eigen::Matrix<double, Rows, 1> whitened = S.matrixL().solve(m.residual);
-    nis = whitened.squaredNorm();
-    const Eigen::Matrix<double, Rows, Rows> L = S.matrixL();
-    log_likelihood = -0.5 * nis - L.diagonal().array().log().sum();
+    // Most of H is zero.
+    std::array<int, kStates> used{};
+    int count = 0;
+    for (int k = 0; k < kStates; ++k)
+      if ((m.H.col(k).array() != 0.0).any()) used[static_cast<size_t>(count++)] = k;
+    PHt_.setZero();
+    for (int r = 0; r < Rows; ++r) {
+      ErrorVector sum = ErrorVector::Zero();
+      for (int i = 0; i < count; ++i) {
+        const int k = used[static_cast<size_t>(i)];
+        sum += m.H(r, k) * P.col(k);
+      }
+      PHt_.col(r) = sum;
+    }
+    explained_.setZero();
+    for (int i = 0; i < count; ++i) {
+      const int k = used[static_cast<size_t>(i)];
+      explained_ += m.H.col(k).lazyProduct(PHt_.row(k));
+    }
+    weigh(m.residual, m.R);
+  }
+
+  /// As if the measurement's covariance were R.
+  void weigh(const Residual& residual, const Small& R) {
+    const Small S = explained_ + R;
+    variance = S.diagonal();
+    usable = S.allFinite() && residual.allFinite() && factorise(S);
+    if (!usable) return;
+    nis = 0.0;
+    log_likelihood = 0.0;
+    for (int i = 0; i < Rows; ++i) {
+      double w = residual(i);
+      for (int k = 0; k < i; ++k) w -= L_(i, k) * whitened_(k);
+      whitened_(i) = w / L_(i, i);
+      nis += whitened_(i) * whitened_(i);
+      log_likelihood -= std::log(L_(i, i));
+    }
+    log_likelihood -= 0.5 * nis;
     usable = std::isfinite(nis);
   }
 
   /// Kalman update in the symmetric form P -= Y Y', Y = P H' L^-T with S = L L' (M.20): every element and its mirror
   /// are the same sum of the same products. `considered` states keep value and variance, but their uncertainty counts
   /// (Schmidt 1966).
-  void apply(NavState& x, ErrorMatrix& P, const Measurement<Rows>& m, const StateRange& considered) const {
-    const Eigen::Matrix<double, Rows, 1> whitened = S.matrixL().solve(m.residual);
-    const Eigen::Matrix<double, Rows, kStates> Yt = S.matrixL().solve(PHt.transpose());
-    const Eigen::Matrix<double, kStates, Rows> Y = Yt.transpose();
-    ErrorVector dx = Y * whitened;
+  void apply(NavState& x, ErrorMatrix& P, const StateRange& considered) const {
+    Eigen::Matrix<double, kStates, Rows> Y;
+    for (int i = 0; i < Rows; ++i) {
+      ErrorVector column = PHt_.col(i);
+      for (int k = 0; k < i; ++k) column -= L_(i, k) * Y.col(k);
+      Y.col(i) = (1.0 / L_(i, i)) * column;
+    }
+    ErrorVector dx = Y.lazyProduct(whitened_);
     if (considered.size == 0) {
       subtract(P, Y);
     } else {
@@ -94,11 +123,36 @@ struct Innovation {
     x = retract(x, dx);
   }
 
+  Residual variance = Residual::Zero();
+  double nis = 0.0;
+  double log_likelihood = 0.0;
+  bool usable = false;  ///< S positive definite and everything finite
+
  private:
   static void subtract(ErrorMatrix& P, const Eigen::Matrix<double, kStates, Rows>& Y) {
-    for (int j = 0; j < kStates; ++j)
-      for (int k = 0; k < Rows; ++k) P.col(j) -= Y.col(k) * Y(j, k);
+    for (int j = 0; j < kStates; ++j) P.col(j) -= Y.lazyProduct(Y.row(j).transpose());
   }
+
+  // S = L L'; false where S is not positive definite.
+  bool factorise(const Small& S) {
+    for (int j = 0; j < Rows; ++j) {
+      double pivot = S(j, j);
+      for (int k = 0; k < j; ++k) pivot -= L_(j, k) * L_(j, k);
+      if (!(pivot > 0.0)) return false;
+      L_(j, j) = std::sqrt(pivot);
+      for (int i = j + 1; i < Rows; ++i) {
+        double rest = S(i, j);
+        for (int k = 0; k < j; ++k) rest -= L_(i, k) * L_(j, k);
+        L_(i, j) = rest / L_(j, j);
+      }
+    }
+    return true;
+  }
+
+  Eigen::Matrix<double, kStates, Rows> PHt_;
+  Small explained_;          // H P H'
+  Small L_ = Small::Zero();  // lower triangle
+  Residual whitened_ = Residual::Zero();
 };
 
 template <int Rows>

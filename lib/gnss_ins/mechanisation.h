@@ -8,6 +8,13 @@
 
 namespace roadfix {
 
+/// R_enu_imu with a row of zeros below: a column is a vector register.
+using PaddedRotation = Eigen::Matrix<double, 4, 3>;
+PaddedRotation padded_rotation(const Eigen::Quaterniond& q);
+
+/// exp(-dt / tau).
+double fading(double dt, double tau);
+
 /// One IMU interval with the state's errors taken out.
 struct InertialStep {
   double dt = 0.0;                                           ///< s
@@ -25,7 +32,7 @@ InertialStep corrected(const NavState& x, const ImuSample& imu, double dt);
 
 /// Moves x, whose attitude as a matrix is R, over `now`; `before` is the step ahead of it (for coning and sculling; dt
 /// 0 where there is none). Returns what the specific force gave, m/s, enu axes.
-Eigen::Vector3d mechanise(NavState& x, const Eigen::Matrix3d& R, const InertialStep& before, const InertialStep& now,
+Eigen::Vector3d mechanise(NavState& x, const PaddedRotation& R, const InertialStep& before, const InertialStep& now,
                           EarthModel& earth);
 
 }  // namespace roadfix
