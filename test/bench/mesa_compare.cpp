@@ -112,8 +112,9 @@ std::vector<float> cast(RayScene& scene, const CameraIntrinsics& lens, const Vie
       F8 x;
       for (int i = 0; i < kLanes; ++i) x[i] = static_cast<float>((u + i - lens.cx) / lens.fx);
       const HitLanes hit =
-          window.intersect({splat(eye.x()), splat(eye.y()), splat(eye.z()), R(0, 0) * x + (R(0, 1) * y + R(0, 2)),
-                            R(1, 0) * x + (R(1, 1) * y + R(1, 2)), R(2, 0) * x + (R(2, 1) * y + R(2, 2))});
+          window.intersect({{splat(eye.x()), splat(eye.y()), splat(eye.z())},
+                            {R(0, 0) * x + (R(0, 1) * y + R(0, 2)), R(1, 0) * x + (R(1, 1) * y + R(1, 2)),
+                             R(2, 0) * x + (R(2, 1) * y + R(2, 2))}});
       store(&out[static_cast<std::size_t>(v * lens.width + u)],
             select(hit.face < 0, splat(std::numeric_limits<float>::infinity()), hit.distance), count);
     }

@@ -47,6 +47,25 @@ inline F8 root(F8 x) {
   return x;
 #endif
 }
+/// a * b + c, rounded once.
+inline F8 fused(F8 a, F8 b, F8 c) {
+#ifdef __FMA__
+  return (F8)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+#else
+  for (int i = 0; i < kLanes; ++i) c[i] = std::fma(a[i], b[i], c[i]);
+  return c;
+#endif
+}
+/// One over x to the last bit or two: the processor's estimate and one step of Newton's. The estimate differs between
+/// makers of processors.
+inline F8 reciprocal(F8 x) {
+#ifdef __FMA__
+  const auto estimate = (F8)_mm256_rcp_ps((__m256)x);
+  return fused(estimate, fused(-x, estimate, splat(1.0F)), estimate);
+#else
+  return 1.0F / x;
+#endif
+}
 inline F8 mix(F8 a, F8 b, F8 share) { return a + (b - a) * share; }
 inline F8 to_float(I8 x) { return __builtin_convertvector(x, F8); }
 inline I8 to_int(F8 x) { return __builtin_convertvector(x, I8); }
@@ -59,9 +78,19 @@ inline I8 floor_int(F8 x) {
   return add_wrapping(truncated, to_float(truncated) > x);
 }
 inline bool any(I8 mask) {
+#ifdef __AVX__
+  return _mm256_testz_si256((__m256i)mask, (__m256i)mask) == 0;
+#else
   const auto x = (I4x64)mask;
   return ((x[0] | x[1]) | (x[2] | x[3])) != 0;
+#endif
 }
+inline float smallest(F8 x) {
+  float m = x[0];
+  for (int i = 1; i < kLanes; ++i) m = x[i] < m ? x[i] : m;
+  return m;
+}
+inline float largest(F8 x) { return -smallest(-x); }
 
 /// Mixes the bits of h: the finaliser of MurmurHash3 (Appleby, 2011).
 inline U8 mix_bits(U8 h) {

@@ -7,9 +7,13 @@
 #include <cstring>
 #include <limits>
 #include <list>
+#include <numeric>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
+
+#include "simulation/scene/sun_grid.h"
 
 namespace roadfix {
 namespace {
@@ -17,9 +21,11 @@ namespace {
 constexpr double kWindowGrid_m = 128.0;
 constexpr double kWindowRadius_m = 450.0;  // the haze covers what appears there
 constexpr int kWindowsKept = 3;            // both cameras of a rig may sit astride a grid line
+constexpr double kStillCell_m = 2.0;       // of the grid across the sun's rays: a window has 500 x 500
+constexpr double kMovingCell_m = 8.0;      // about a car
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-std::array<float, 3> floats(const Eigen::Vector3d& x) {
+Float3 floats(const Eigen::Vector3d& x) {
   return {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z())};
 }
 
@@ -54,23 +60,28 @@ FaceShade shade_of(const Face& f, const SE3& T_enu_face, const Eigen::Vector3d& 
   return s;
 }
 
+std::array<Float3, 4> seen_from(const Eigen::Vector3d& origin, const Face& f, const SE3& T_enu_face) {
+  std::array<Float3, 4> out;
+  for (std::size_t k = 0; k < 4; ++k) out[k] = floats(T_enu_face * f.corner[k] - origin);
+  return out;
+}
+
 /// Quads under one Embree scene; corners in window coordinates.
 class QuadScene {
  public:
   QuadScene() = default;
-  QuadScene(RTCDevice device, const std::vector<std::array<float, 3>>& corners) {
-    if (corners.empty()) return;
+  QuadScene(RTCDevice device, std::span<const std::array<Float3, 4>> faces) {
+    if (faces.empty()) return;
     scene_ = rtcNewScene(device);
     rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_QUAD);
     auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), corners.size()));
+                                                               3 * sizeof(float), 4 * faces.size()));
     auto* index = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
-                                                                 4 * sizeof(unsigned), corners.size() / 4));
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      std::copy(corners[i].begin(), corners[i].end(), vertex + 3 * i);
-      index[i] = static_cast<unsigned>(i);
-    }
+                                                                 4 * sizeof(unsigned), faces.size()));
+    for (const auto& face : faces)
+      for (const Float3& corner : face) vertex = std::copy(corner.begin(), corner.end(), vertex);
+    std::iota(index, index + 4 * faces.size(), 0U);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_, geometry);
     rtcReleaseGeometry(geometry);
@@ -90,16 +101,15 @@ class QuadScene {
   RTCScene scene_ = nullptr;
 };
 
-template <class Ray>
-void fill(Ray& out, const RayLanes& rays, F8 reach) {
+void fill(RTCRay8& out, const RayLanes& rays, float reach) {
   const auto copy = [](const auto& from, auto& to) { std::memcpy(to, &from, sizeof to); };
-  copy(rays.x, out.org_x);
-  copy(rays.y, out.org_y);
-  copy(rays.z, out.org_z);
-  copy(rays.dx, out.dir_x);
-  copy(rays.dy, out.dir_y);
-  copy(rays.dz, out.dir_z);
-  copy(reach, out.tfar);
+  copy(rays.origin.x, out.org_x);
+  copy(rays.origin.y, out.org_y);
+  copy(rays.origin.z, out.org_z);
+  copy(rays.direction.x, out.dir_x);
+  copy(rays.direction.y, out.dir_y);
+  copy(rays.direction.z, out.dir_z);
+  copy(splat(reach), out.tfar);
   std::memset(out.tnear, 0, sizeof out.tnear);
   std::memset(out.time, 0, sizeof out.time);
   std::memset(out.mask, 0xFF, sizeof out.mask);
@@ -113,20 +123,47 @@ struct RayWindow::Impl {
   std::tuple<int, int, int> cell;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::vector<FaceShade> faces;
+  std::vector<std::array<Float3, 4>> corners;
+  std::vector<Triangle> triangles;
   std::size_t num_static = 0;
   double t_s = std::numeric_limits<double>::quiet_NaN();
   QuadScene still;
   QuadScene moving;
+  Float3 to_sun{};
+  SunGrid still_shadows;
+  SunGrid moving_shadows;
+
+  void add(const FaceShade& shade, const std::array<Float3, 4>& corner) {
+    faces.push_back(shade);
+    corners.push_back(corner);
+    const auto halves = triangles_of(corner);
+    triangles.insert(triangles.end(), halves.begin(), halves.end());
+  }
+  [[nodiscard]] I8 occluded(const RayLanes& rays, I8 active, float reach) const;
+  /// Of the faces from `first` on.
+  [[nodiscard]] SunGrid shadows(std::size_t first, double cell_m) const {
+    return {to_sun, {triangles.begin() + static_cast<std::ptrdiff_t>(2 * first), triangles.end()}, cell_m};
+  }
 };
 
 RayWindow::RayWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RayWindow::~RayWindow() = default;
 const Eigen::Vector3d& RayWindow::origin() const { return impl_->origin; }
 const std::vector<FaceShade>& RayWindow::faces() const { return impl_->faces; }
+const std::vector<std::array<Float3, 4>>& RayWindow::corners() const { return impl_->corners; }
+const std::vector<Triangle>& RayWindow::triangles() const { return impl_->triangles; }
+
+I8 RayWindow::shaded(const Lanes3& point, I8 active, float reach_m) const {
+  const SunGrid::Shade still = impl_->still_shadows.shaded(point, active, reach_m);
+  const SunGrid::Shade moving = impl_->moving_shadows.shaded(point, active & ~still.dark, reach_m);
+  const I8 dark = still.dark | moving.dark;
+  const I8 doubtful = (still.doubtful | moving.doubtful) & ~dark;
+  return any(doubtful) ? impl_->occluded({point, splat(impl_->to_sun)}, active, reach_m) : dark;
+}
 
 HitLanes RayWindow::intersect(const RayLanes& rays) const {
   RTCRayHit8 query;
-  fill(query.ray, rays, splat(kInfinity));
+  fill(query.ray, rays, kInfinity);
   for (int i = 0; i < kLanes; ++i) {
     query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     query.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
@@ -154,7 +191,7 @@ HitLanes RayWindow::intersect(const RayLanes& rays) const {
   return hit;
 }
 
-I8 RayWindow::occluded(const RayLanes& rays, I8 active, F8 reach) const {
+I8 RayWindow::Impl::occluded(const RayLanes& rays, I8 active, float reach) const {
   RTCRay8 query;
   fill(query, rays, reach);
   alignas(32) int valid[kLanes];
@@ -162,8 +199,8 @@ I8 RayWindow::occluded(const RayLanes& rays, I8 active, F8 reach) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  if (impl_->still.get() != nullptr) rtcOccluded8(valid, impl_->still.get(), &context, &query);
-  if (impl_->moving.get() != nullptr) rtcOccluded8(valid, impl_->moving.get(), &context, &query);
+  if (still.get() != nullptr) rtcOccluded8(valid, still.get(), &context, &query);
+  if (moving.get() != nullptr) rtcOccluded8(valid, moving.get(), &context, &query);
   I8 blocked{};
   for (int i = 0; i < kLanes; ++i) blocked[i] = active[i] != 0 && query.tfar[i] < 0.0F ? -1 : 0;
   return blocked;
@@ -202,16 +239,16 @@ struct RayScene::Impl {
   std::unique_ptr<RayWindow> make_window(const std::tuple<int, int, int>& cell) const {
     auto impl = std::make_unique<RayWindow::Impl>();
     impl->cell = cell;
+    impl->to_sun = floats(world->to_sun);
     impl->origin = kWindowGrid_m * Eigen::Vector3d(std::get<0>(cell), std::get<1>(cell), std::get<2>(cell));
-    std::vector<std::array<float, 3>> corners;
     for (const Face& f : world->faces) {
       const Eigen::Vector3d middle = 0.25 * (f.corner[0] + f.corner[1] + f.corner[2] + f.corner[3]);
       if ((middle - impl->origin).norm() > kWindowRadius_m + (f.corner[0] - middle).norm()) continue;
-      impl->faces.push_back(shade_of(f, SE3{}, Eigen::Vector3d::Zero()));
-      for (const auto& c : f.corner) corners.push_back(floats(c - impl->origin));
+      impl->add(shade_of(f, SE3{}, Eigen::Vector3d::Zero()), seen_from(impl->origin, f, SE3{}));
     }
     impl->num_static = impl->faces.size();
-    impl->still = QuadScene(device, corners);
+    impl->still = QuadScene(device, impl->corners);
+    impl->still_shadows = impl->shadows(0, kStillCell_m);
     return std::make_unique<RayWindow>(std::move(impl));
   }
 
@@ -219,19 +256,21 @@ struct RayScene::Impl {
     if (window.t_s == t_s) return;
     window.t_s = t_s;
     window.faces.resize(window.num_static);
-    std::vector<std::array<float, 3>> corners;
+    window.corners.resize(window.num_static);
+    window.triangles.resize(2 * window.num_static);
     for (const Mover& m : world->movers) {
       const SE3 T_enu_car = m.pose(t_s);
       if ((T_enu_car.p - window.origin).norm() > kWindowRadius_m) continue;
       const Eigen::Vector3d velocity = m.velocity(t_s);
       const float light = m.light(t_s);
       for (const Face& f : m.faces) {
-        window.faces.push_back(shade_of(f, T_enu_car, velocity));
-        for (float& l : window.faces.back().light) l *= light;
-        for (const auto& c : f.corner) corners.push_back(floats(T_enu_car * c - window.origin));
+        FaceShade shade = shade_of(f, T_enu_car, velocity);
+        for (float& l : shade.light) l *= light;
+        window.add(shade, seen_from(window.origin, f, T_enu_car));
       }
     }
-    window.moving = QuadScene(device, corners);
+    window.moving = QuadScene(device, std::span(window.corners).subspan(window.num_static));
+    window.moving_shadows = window.shadows(window.num_static, kMovingCell_m);
   }
 };
 

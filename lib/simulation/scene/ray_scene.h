@@ -1,15 +1,17 @@
-/// Rays against the world, through Embree: what the camera sees, and what lies in the shade.
+/// The world made ready for rays. They are computed in floats, so in *windows*: the faces within kWindowRadius_m of a
+/// grid point near the camera, in coordinates from that point. The window depends on the camera's position alone, never
+/// on what was asked before.
 ///
-/// Embree computes in floats, so rays are cast in *windows*: the faces within kWindowRadius_m of a grid point near the
-/// camera, in coordinates from that point. The window depends on the camera's position alone, never on what was asked
-/// before. Embree is pinned to AVX2 and to building on the calling thread (DESIGN.md, section 5).
+/// Pictures look through tiles.h and towards the sun through sun_grid.h, which know that their rays share an origin or
+/// a direction. Any other ray goes to Embree, pinned to AVX2 and to building on the calling thread (DESIGN.md, section
+/// 5); it also tells the tests what the others must find.
 #pragma once
 
 #include <array>
 #include <memory>
 #include <vector>
 
-#include "simulation/scene/lanes.h"
+#include "simulation/scene/triangle.h"
 #include "simulation/scene/world.h"
 
 namespace roadfix {
@@ -30,8 +32,8 @@ struct FaceShade {
 };
 
 struct RayLanes {
-  F8 x, y, z;     ///< origin, window coordinates
-  F8 dx, dy, dz;  ///< direction, any length
+  Lanes3 origin;     ///< window coordinates
+  Lanes3 direction;  ///< any length
 };
 
 /// Face -1: nothing hit. distance in lengths of the direction; u, v along the face's edges.
@@ -66,9 +68,11 @@ class RayWindow {
 
   [[nodiscard]] const Eigen::Vector3d& origin() const;        ///< enu
   [[nodiscard]] const std::vector<FaceShade>& faces() const;  ///< static ones first, then those of moving cars
+  [[nodiscard]] const std::vector<std::array<Float3, 4>>& corners() const;  ///< of the faces
+  [[nodiscard]] const std::vector<Triangle>& triangles() const;             ///< two a face
+  /// -1 where something lies between a point and `reach_m` further towards the sun; lanes not `active` give 0.
+  [[nodiscard]] I8 shaded(const Lanes3& point, I8 active, float reach_m) const;
   [[nodiscard]] HitLanes intersect(const RayLanes& rays) const;
-  /// -1 where something lies between the ray's origin and `reach` lengths of its direction; lanes not `active` give 0.
-  [[nodiscard]] I8 occluded(const RayLanes& rays, I8 active, F8 reach) const;
   [[nodiscard]] bool occluded(const Eigen::Vector3d& from_enu, const Eigen::Vector3d& to_enu) const;
 
  private:

@@ -9,16 +9,16 @@
 namespace roadfix {
 namespace {
 
-constexpr int kBandRows = 8;
 /// Places of an edge pixel's four rays in it: a rotated grid, no two in one row or column.
 constexpr float kGridU[4] = {-0.125F, 0.375F, -0.375F, 0.125F};
 constexpr float kGridV[4] = {-0.375F, -0.125F, 0.125F, 0.375F};
 
 }  // namespace
 
-/// What all bands of one picture share.
+/// What all rows of tiles of one picture share.
 struct Renderer::Frame {
   const RayWindow& window;
+  TileLists& lists;
   Eigen::Matrix3f R;      // camera to enu
   Eigen::Vector3f eye;    // window coordinates
   Eigen::Vector3f drift;  // camera's velocity, enu
@@ -45,6 +45,7 @@ Renderer::Renderer(const World& world, const Camera& camera)
   }
   // Whole lanes are read at the end of the last row.
   for (auto* rays : {&ray_x_, &ray_y_}) rays->insert(rays->end(), kLanes, 0.0F);
+  tiles_ = TileGrid(width_, height_, ray_x_, ray_y_);
 }
 
 Renderer::Pixels Renderer::directions(const int (&x)[kLanes], const int (&y)[kLanes]) const {
@@ -98,12 +99,9 @@ Seen seen_of(const RayWindow& window, const HitLanes& hit) {
 template <class Pixels>
 PixelRays rays_of(const Eigen::Matrix3f& R, const Eigen::Vector3f& eye, const Pixels& p, float scale) {
   PixelRays r;
-  r.ray.x = splat(eye.x());
-  r.ray.y = splat(eye.y());
-  r.ray.z = splat(eye.z());
-  r.ray.dx = R(0, 0) * p.x + R(0, 1) * p.y + R(0, 2);
-  r.ray.dy = R(1, 0) * p.x + R(1, 1) * p.y + R(1, 2);
-  r.ray.dz = R(2, 0) * p.x + R(2, 1) * p.y + R(2, 2);
+  r.ray.origin = {splat(eye.x()), splat(eye.y()), splat(eye.z())};
+  r.ray.direction = {R(0, 0) * p.x + R(0, 1) * p.y + R(0, 2), R(1, 0) * p.x + R(1, 1) * p.y + R(1, 2),
+                     R(2, 0) * p.x + R(2, 1) * p.y + R(2, 2)};
   r.dx_u = scale * (R(0, 0) * p.x_u + R(0, 1) * p.y_u);
   r.dy_u = scale * (R(1, 0) * p.x_u + R(1, 1) * p.y_u);
   r.dz_u = scale * (R(2, 0) * p.x_u + R(2, 1) * p.y_u);
@@ -116,22 +114,24 @@ PixelRays rays_of(const Eigen::Matrix3f& R, const Eigen::Vector3f& eye, const Pi
 }  // namespace
 
 void Renderer::first_pass(const Frame& frame, int band, LightField& out) const {
-  const int end = std::min(height_, (band + 1) * kBandRows);
-  for (int row = band * kBandRows; row < end; ++row) {
+  frame.lists.fill(band);
+  const int end = std::min(height_, (band + 1) * TileGrid::kHeight);
+  for (int row = band * TileGrid::kHeight; row < end; ++row) {
     for (int column = 0; column < width_; column += kLanes) {
       const Pixels p = row_of_pixels(column, row);
       const PixelRays rays = rays_of(frame.R, frame.eye, p, 1.0F);
-      const HitLanes hit = frame.window.intersect(rays.ray);
+      const int tile = column / TileGrid::kWidth;
+      const HitLanes hit = frame.lists.intersect(band, {tile, tile}, rays.ray.direction);
       const Shade s = shade(frame.window, frame.to_sun, rays, hit);
       const I8 sky = hit.face < 0;
       const Seen seen = seen_of(frame.window, hit);
       // Velocity of the point against the camera over its depth, in camera axes, then in pixels.
-      const RayLanes& d = rays.ray;
+      const Lanes3& d = rays.ray.direction;
       const F8 per_depth = select(sky, splat(0.0F), 1.0F / hit.distance);
       const Eigen::Vector3f& rate = frame.rate;
-      const F8 wx = rate.z() * d.dy - rate.y() * d.dz + (seen.velocity[0] - frame.drift.x()) * per_depth;
-      const F8 wy = rate.x() * d.dz - rate.z() * d.dx + (seen.velocity[1] - frame.drift.y()) * per_depth;
-      const F8 wz = rate.y() * d.dx - rate.x() * d.dy + (seen.velocity[2] - frame.drift.z()) * per_depth;
+      const F8 wx = rate.z() * d.y - rate.y() * d.z + (seen.velocity[0] - frame.drift.x()) * per_depth;
+      const F8 wy = rate.x() * d.z - rate.z() * d.x + (seen.velocity[1] - frame.drift.y()) * per_depth;
+      const F8 wz = rate.y() * d.x - rate.x() * d.y + (seen.velocity[2] - frame.drift.z()) * per_depth;
       const Eigen::Matrix3f& R = frame.R;
       const F8 cz = R(0, 2) * wx + R(1, 2) * wy + R(2, 2) * wz;
       const F8 nx = R(0, 0) * wx + R(1, 0) * wy + R(2, 0) * wz - p.x * cz;
@@ -170,7 +170,9 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
       p.y[i] += kGridU[i % 4] * p.y_u[i] + kGridV[i % 4] * p.y_v[i];
     }
     const PixelRays rays = rays_of(frame.R, frame.eye, p, 0.5F);
-    const F8 light = shade(frame.window, frame.to_sun, rays, frame.window.intersect(rays.ray)).radiance;
+    const HitLanes hit =
+        frame.lists.intersect(band, {x[0] / TileGrid::kWidth, x[4] / TileGrid::kWidth}, rays.ray.direction);
+    const F8 light = shade(frame.window, frame.to_sun, rays, hit).radiance;
     for (int k = 0; k < pending; ++k) {
       const int i = 4 * k;
       out.radiance[static_cast<std::size_t>(y[i] * width_ + x[i])] =
@@ -178,8 +180,8 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
     }
     pending = 0;
   };
-  const int end = std::min(height_, (band + 1) * kBandRows);
-  for (int row = band * kBandRows; row < end; ++row) {
+  const int end = std::min(height_, (band + 1) * TileGrid::kHeight);
+  for (int row = band * TileGrid::kHeight; row < end; ++row) {
     for (int column = 0; column < width_; ++column) {
       if (!on_edge(column, row)) continue;
       for (int i = 4 * pending; i < 4 * pending + 4; ++i) x[i] = column, y[i] = row;
@@ -192,9 +194,12 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
 void Renderer::render(RayScene& scene, const View& view, Executor& executor, LightField& out) const {
   const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s);
   const Eigen::Matrix3d R = view.T_enu_camera.R();
+  const Eigen::Vector3f eye = (view.T_enu_camera.p - window.origin()).cast<float>();
+  TileLists lists(tiles_, window, R.cast<float>(), eye);
   const Frame frame{window,
+                    lists,
                     R.cast<float>(),
-                    (view.T_enu_camera.p - window.origin()).cast<float>(),
+                    eye,
                     view.velocity_enu.cast<float>(),
                     (R * view.angular_rate).cast<float>(),
                     to_sun_.cast<float>()};
@@ -203,9 +208,8 @@ void Renderer::render(RayScene& scene, const View& view, Executor& executor, Lig
   const auto pixels = static_cast<std::size_t>(width_ * height_);
   for (auto* plane : {&out.radiance, &out.depth, &out.flow_u, &out.flow_v}) plane->resize(pixels);
   out.surface.resize(pixels);
-  const int bands = (height_ + kBandRows - 1) / kBandRows;
-  executor.for_each(bands, [&](int band) { first_pass(frame, band, out); });
-  executor.for_each(bands, [&](int band) { edge_pass(frame, band, out); });
+  executor.for_each(tiles_.rows(), [&](int band) { first_pass(frame, band, out); });
+  executor.for_each(tiles_.rows(), [&](int band) { edge_pass(frame, band, out); });
 }
 
 }  // namespace roadfix

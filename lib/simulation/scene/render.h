@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "camera/camera.h"
-#include "simulation/scene/ray_scene.h"
+#include "simulation/scene/tiles.h"
 #include "stream/executor.h"
 
 namespace roadfix {
@@ -51,6 +51,7 @@ class Renderer {
   Eigen::Vector3d to_sun_;
   int width_, height_;
   std::vector<float> ray_x_, ray_y_;  ///< normalised coordinates of pixel centres, one pixel more on each side
+  TileGrid tiles_;
 };
 
 }  // namespace roadfix

@@ -15,9 +15,7 @@ constexpr float kShadowOffset_m = 0.01F;  // ray origins are lifted off the surf
 constexpr float kShadowReach_m = 120.0F;  // longer shadows than any house's at noon
 constexpr float kWidest_m = 60.0F;        // of a footprint
 
-struct V8 {
-  F8 x, y, z;
-};
+using V8 = Lanes3;
 F8 dot(const V8& a, const V8& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 /// The faces under eight pixels, lane by lane; the sky's lanes hold face 0.
@@ -121,7 +119,7 @@ F8 sky(const V8& d, const F8& length) {
 }  // namespace
 
 Shade shade(const RayWindow& window, const Eigen::Vector3f& to_sun, const PixelRays& pixels, const HitLanes& hit) {
-  const V8 d{pixels.ray.dx, pixels.ray.dy, pixels.ray.dz};
+  const V8& d = pixels.ray.direction;
   const F8 length = root(dot(d, d));
   const I8 is_sky = hit.face < 0;
   Shade out{splat(0.0F), I8{}};
@@ -137,13 +135,10 @@ Shade shade(const RayWindow& window, const Eigen::Vector3f& to_sun, const PixelR
     const I8 day = (facing > 0.0F) & ~is_sky & ~lamp;
     if (any(day)) {
       const F8 lift = kShadowOffset_m + 2e-4F * safe.distance;
-      const RayLanes to_light{pixels.ray.x + safe.distance * d.x + lift * n.x,
-                              pixels.ray.y + safe.distance * d.y + lift * n.y,
-                              pixels.ray.z + safe.distance * d.z + lift * n.z,
-                              splat(to_sun.x()),
-                              splat(to_sun.y()),
-                              splat(to_sun.z())};
-      out.sunlit = day & ~window.occluded(to_light, day, splat(kShadowReach_m));
+      const V8& o = pixels.ray.origin;
+      const V8 lifted{o.x + safe.distance * d.x + lift * n.x, o.y + safe.distance * d.y + lift * n.y,
+                      o.z + safe.distance * d.z + lift * n.z};
+      out.sunlit = day & ~window.shaded(lifted, day, kShadowReach_m);
     }
     const F8 u = hit.u;
     const F8 v = hit.v;
