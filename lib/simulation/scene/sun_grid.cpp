@@ -10,6 +10,7 @@ namespace roadfix {
 namespace {
 
 constexpr double kMargin_m = 0.01;  // far above the rounding of floats within a window
+constexpr float kEdge_m = 1e-4F;    // floats 450 m from their origin are good to a third of this
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 Eigen::Vector3d vector(const Float3& x) { return {x[0], x[1], x[2]}; }
@@ -122,7 +123,7 @@ SunGrid::Shade SunGrid::shaded(const Lanes3& point, I8 active, float reach_m) co
     for (std::uint32_t at = begin_[k]; at < begin_[k + 1] && entries_[at].top >= lowest; ++at) {
       const Triangle& t = triangles_[entries_[at].triangle];
       const Lanes3 from_point{t.corner[0] - point.x, t.corner[1] - point.y, t.corner[2] - point.z};
-      const TriangleHit hit = meet(t, from_point, sun, splat(reach_m));
+      const TriangleHit hit = meet(t, from_point, sun, splat(reach_m), kEdge_m);
       shade.doubtful |= hit.at_edge & left;
       shade.dark |= hit.valid & left & ~hit.at_edge;
       if (!any(here & ~shade.dark)) break;

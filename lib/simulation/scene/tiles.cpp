@@ -11,6 +11,7 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNearest_m = 1e-3F;  // depth before which nothing is seen
 constexpr float kRounding = 4e-6F;   // of products of coordinates in floats, with a margin
+constexpr float kEdge_m = 2e-5F;      // rounding of floats 100 m from their origin, with a margin
 constexpr float kShare = 1e-5F;      // margin of depths
 
 struct Interval {
@@ -216,13 +217,13 @@ void TileLists::search(int row, int column, const Lanes3& direction, Nearest& ne
     if (entry.nearest > farthest) break;
     const Seen& s = seen_[entry.seen];
     const F8 reach = hit.distance * (1.0F + kShare);
-    const TriangleHit h = meet(window_.triangles()[s.triangle], splat(s.from_eye), direction, reach);
+    const TriangleHit h = meet(window_.triangles()[s.triangle], splat(s.from_eye), direction, reach, kEdge_m);
     nearest.doubtful |= h.at_edge;
     if (!any(h.valid)) continue;
     const F8 per_scale = reciprocal(h.scale);
     const F8 distance = h.distance * per_scale;
-    const auto face = static_cast<std::int32_t>(s.triangle / 2);
-    nearest.doubtful |= h.valid & (distance * (1.0F + kShare) >= hit.distance);
+    const auto triangle = static_cast<std::int32_t>(s.triangle);
+    nearest.doubtful |= h.valid & (distance * (1.0F + kShare) >= hit.distance) & (hit.face != triangle);
     const I8 nearer = h.valid & (h.distance <= h.scale * hit.distance);
     const F8 u = h.u * per_scale;
     const F8 v = h.v * per_scale;
@@ -230,7 +231,7 @@ void TileLists::search(int row, int column, const Lanes3& direction, Nearest& ne
     hit.u = select(nearer, second ? 1.0F - u : u, hit.u);
     hit.v = select(nearer, second ? 1.0F - v : v, hit.v);
     hit.distance = select(nearer, distance, hit.distance);
-    hit.face = nearer ? I8{} + face : hit.face;
+    hit.face = nearer ? I8{} + triangle : hit.face;
     farthest = largest(hit.distance) * (1.0F + kShare);
   }
 }
@@ -239,7 +240,10 @@ HitLanes TileLists::intersect(int row, std::array<int, 2> columns, const Lanes3&
   Nearest nearest{{I8{} - 1, splat(kInfinity), splat(0.0F), splat(0.0F)}, I8{}};
   search(row, columns[0], direction, nearest);
   if (columns[1] != columns[0]) search(row, columns[1], direction, nearest);
-  if (!any(nearest.doubtful)) return nearest.hit;
+  if (!any(nearest.doubtful)) {
+    nearest.hit.face >>= 1;  // -1 stays
+    return nearest.hit;
+  }
   const Lanes3 eye{splat(eye_.x()), splat(eye_.y()), splat(eye_.z())};
   return window_.intersect({eye, direction});
 }

@@ -80,7 +80,7 @@ class TileLists {
     std::vector<Entry> entries;
     std::vector<std::uint32_t> begin;  ///< of each tile's entries, and the end of the last
   };
-  /// The nearest hits so far, and the lanes in which rounding decides.
+  /// The nearest hits so far, with triangles for faces, and the lanes in which rounding decides.
   struct Nearest {
     HitLanes hit;
     I8 doubtful;

@@ -5,8 +5,6 @@
 namespace roadfix {
 namespace {
 
-constexpr float kEdge_m = 1e-4F;  // floats 450 m from their origin are good to a third of this
-
 Float3 minus(const Float3& a, const Float3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 Float3 cross(const Float3& a, const Float3& b) {
@@ -18,7 +16,7 @@ Triangle triangle(const Float3& a, const Float3& b, const Float3& c) {
   Triangle t{a, minus(a, b), minus(c, a), {}, 0.0F};
   t.normal = cross(t.edge2, t.edge1);
   const auto length = [](const Float3& x) { return std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]); };
-  t.doubt = kEdge_m * (length(t.edge1) + length(t.edge2));
+  t.edges = length(t.edge1) + length(t.edge2);
   return t;
 }
 

@@ -16,7 +16,7 @@ struct Triangle {
   Float3 edge1;   ///< from the second corner to the first
   Float3 edge2;   ///< from the first to the third
   Float3 normal;  ///< edge2 x edge1, any length
-  float doubt;    ///< TriangleHit's u, v below which a ray passes so near to an edge that rounding decides
+  float edges;    ///< lengths of edge1 and edge2, m
 };
 
 /// Coordinates of a hit are to be divided by `scale`, and count from the face's corner 0 or 2.
@@ -39,8 +39,8 @@ inline Lanes3 cross_fused(const Lanes3& a, const Lanes3& b) {
 std::array<Triangle, 2> triangles_of(const std::array<Float3, 4>& corner);
 
 /// `from_origin`: the triangle's first corner seen from the ray's origin. Hits lie beyond the origin and not beyond
-/// `reach` lengths of the direction.
-inline TriangleHit meet(const Triangle& t, const Lanes3& from_origin, const Lanes3& direction, F8 reach) {
+/// `reach` lengths of the direction. `edge_m`: how near to an edge is at it.
+inline TriangleHit meet(const Triangle& t, const Lanes3& from_origin, const Lanes3& direction, F8 reach, float edge_m) {
   const Lanes3 normal = splat(t.normal);
   const Lanes3 r = cross_fused(from_origin, direction);
   const F8 det = dot_fused(normal, direction);
@@ -54,7 +54,7 @@ inline TriangleHit meet(const Triangle& t, const Lanes3& from_origin, const Lane
   hit.distance = turned(dot_fused(normal, from_origin));
   const I8 within_reach = (hit.scale > 0.0F) & (hit.distance > 0.0F) & (hit.distance <= hit.scale * reach);
   hit.valid = (inside >= 0.0F) & within_reach;
-  hit.at_edge = (abs(inside) < t.doubt) & within_reach;
+  hit.at_edge = (abs(inside) < edge_m * t.edges) & within_reach;
   return hit;
 }
 
