@@ -31,7 +31,40 @@ inline F8 load(const float* from) {
 template <class Element, class Lanes>
 void store(Element* to, const Lanes& x, int count) {
   static_assert(sizeof(Element) * kLanes == sizeof(Lanes));
-  std::memcpy(to, &x, static_cast<std::size_t>(count) * sizeof(Element));
+  if (count == kLanes) {
+    std::memcpy(to, &x, sizeof x);
+  } else {
+    std::memcpy(to, &x, static_cast<std::size_t>(count) * sizeof(Element));
+  }
+}
+/// table[index], lane by lane.
+inline F8 look_up(const float* table, I8 index) {
+#ifdef __AVX2__
+  return (F8)_mm256_i32gather_ps(table, (__m256i)index, sizeof(float));
+#else
+  F8 x;
+  for (int i = 0; i < kLanes; ++i) x[i] = table[index[i]];
+  return x;
+#endif
+}
+/// Makes of eight rows of eight the eight columns.
+inline void transpose(F8 (&x)[kLanes]) {
+  F8 y[kLanes];
+  for (int i = 0; i < kLanes; i += 2) {
+    y[i] = __builtin_shufflevector(x[i], x[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+    y[i + 1] = __builtin_shufflevector(x[i], x[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+  for (int i = 0; i < 2; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      x[4 * i + 2 * k] = __builtin_shufflevector(y[4 * i + k], y[4 * i + k + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+      x[4 * i + 2 * k + 1] = __builtin_shufflevector(y[4 * i + k], y[4 * i + k + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+  }
+  for (int i = 0; i < 4; ++i) {
+    y[i] = __builtin_shufflevector(x[i], x[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    y[i + 4] = __builtin_shufflevector(x[i], x[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+  for (int i = 0; i < kLanes; ++i) x[i] = y[i];
 }
 inline F8 min(F8 a, F8 b) { return a < b ? a : b; }
 inline F8 max(F8 a, F8 b) { return a > b ? a : b; }

@@ -16,8 +16,8 @@
 
 namespace roadfix {
 
-/// What shading needs to know of a face, in window coordinates and floats.
-struct FaceShade {
+/// What shading needs to know of a face, in window coordinates and floats: 32 words, which shading.cpp reads as such.
+struct alignas(32) FaceShade {
   std::array<float, 3> normal;
   std::array<float, 3> grad_s;  ///< of the texture coordinate by the point
   std::array<float, 3> grad_t;
@@ -29,7 +29,9 @@ struct FaceShade {
   std::int32_t material, pattern;
   std::uint32_t key, group;
   std::array<float, 3> velocity;  ///< m/s, enu axes
+  std::array<float, 3> unused;
 };
+static_assert(sizeof(FaceShade) == 128);
 
 struct RayLanes {
   Lanes3 origin;     ///< window coordinates

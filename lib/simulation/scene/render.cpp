@@ -86,6 +86,12 @@ struct Seen {
 
 Seen seen_of(const RayWindow& window, const HitLanes& hit) {
   Seen seen;
+  if (hit.face[0] >= 0 && !any(hit.face != hit.face[0])) {  // the usual case
+    const FaceShade& face = window.faces()[static_cast<std::size_t>(hit.face[0])];
+    seen.group = splat(face.group);
+    for (std::size_t k = 0; k < 3; ++k) seen.velocity[k] = splat(face.velocity[k]);
+    return seen;
+  }
   for (int i = 0; i < kLanes; ++i) {
     if (hit.face[i] < 0) continue;
     const FaceShade& face = window.faces()[static_cast<std::size_t>(hit.face[i])];

@@ -1,5 +1,6 @@
 #include "simulation/scene/shading.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "simulation/scene/texture.h"
@@ -25,54 +26,45 @@ struct FaceLanes {
   SurfaceLanes surface;
 };
 
-/// All lanes on one face, the usual case.
-FaceLanes spread(const FaceShade& s) {
+/// FaceShade's words, each in eight lanes.
+FaceLanes lanes_of(const F8 (&w)[32]) {
   FaceLanes f;
-  f.normal = {splat(s.normal[0]), splat(s.normal[1]), splat(s.normal[2])};
-  f.grad_s = {splat(s.grad_s[0]), splat(s.grad_s[1]), splat(s.grad_s[2])};
-  f.grad_t = {splat(s.grad_t[0]), splat(s.grad_t[1]), splat(s.grad_t[2])};
-  for (int k = 0; k < 4; ++k) f.light[k] = splat(s.light[static_cast<std::size_t>(k)]);
-  f.extent_s = splat(s.extent_s);
-  f.extent_t = splat(s.extent_t);
-  const I8 zero{};
-  f.surface.s = splat(s.s);
-  f.surface.t = splat(s.t);
-  f.surface.block_s = zero + s.block_s;
-  f.surface.block_t = zero + s.block_t;
-  f.surface.material = zero + s.material;
-  f.surface.pattern = zero + s.pattern;
-  f.surface.key = splat(s.key);
-  f.surface.tint = splat(s.tint);
-  f.surface.pattern_s = splat(s.pattern_s);
-  f.surface.pattern_t = splat(s.pattern_t);
+  f.normal = {w[0], w[1], w[2]};
+  f.grad_s = {w[3], w[4], w[5]};
+  f.grad_t = {w[6], w[7], w[8]};
+  f.surface.s = w[9];
+  f.surface.t = w[10];
+  f.extent_s = w[11];
+  f.extent_t = w[12];
+  f.surface.block_s = (I8)w[13];
+  f.surface.block_t = (I8)w[14];
+  for (int k = 0; k < 4; ++k) f.light[k] = w[15 + k];
+  f.surface.tint = w[19];
+  f.surface.pattern_s = w[20];
+  f.surface.pattern_t = w[21];
+  f.surface.material = (I8)w[22];
+  f.surface.pattern = (I8)w[23];
+  f.surface.key = (U8)w[24];
   return f;
 }
 
 FaceLanes gather(const RayWindow& window, const HitLanes& hit) {
-  if (hit.face[0] >= 0 && !any(hit.face != hit.face[0]))
-    return spread(window.faces()[static_cast<std::size_t>(hit.face[0])]);
-  FaceLanes f;
-  for (int i = 0; i < kLanes; ++i) {
-    const FaceShade& s = window.faces()[static_cast<std::size_t>(hit.face[i] < 0 ? 0 : hit.face[i])];
-    f.normal.x[i] = s.normal[0], f.normal.y[i] = s.normal[1], f.normal.z[i] = s.normal[2];
-    f.grad_s.x[i] = s.grad_s[0], f.grad_s.y[i] = s.grad_s[1], f.grad_s.z[i] = s.grad_s[2];
-    f.grad_t.x[i] = s.grad_t[0], f.grad_t.y[i] = s.grad_t[1], f.grad_t.z[i] = s.grad_t[2];
-    for (int k = 0; k < 4; ++k) f.light[k][i] = s.light[static_cast<std::size_t>(k)];
-    f.extent_s[i] = s.extent_s;
-    f.extent_t[i] = s.extent_t;
-    SurfaceLanes& p = f.surface;
-    p.s[i] = s.s;
-    p.t[i] = s.t;
-    p.block_s[i] = s.block_s;
-    p.block_t[i] = s.block_t;
-    p.material[i] = s.material;
-    p.pattern[i] = s.pattern;
-    p.key[i] = s.key;
-    p.tint[i] = s.tint;
-    p.pattern_s[i] = s.pattern_s;
-    p.pattern_t[i] = s.pattern_t;
+  const auto words = [&](int face) {
+    return reinterpret_cast<const float*>(&window.faces()[static_cast<std::size_t>(std::max(face, 0))]);
+  };
+  F8 w[32];
+  if (hit.face[0] >= 0 && !any(hit.face != hit.face[0])) {  // the usual case
+    const float* const one = words(hit.face[0]);
+    for (int k = 0; k < 32; ++k) w[k] = splat(one[k]);
+    return lanes_of(w);
   }
-  return f;
+  for (int part = 0; part < 4; ++part) {
+    F8 rows[kLanes];
+    for (int i = 0; i < kLanes; ++i) rows[i] = load(words(hit.face[i]) + kLanes * part);
+    transpose(rows);
+    std::copy(rows, rows + kLanes, w + kLanes * part);
+  }
+  return lanes_of(w);
 }
 
 /// Moves coordinates beyond the block's end into the next blocks.

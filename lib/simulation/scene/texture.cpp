@@ -1,5 +1,7 @@
 #include "simulation/scene/texture.h"
 
+#include <iterator>
+
 #include "simulation/scene/pattern.h"
 
 namespace roadfix {
@@ -74,22 +76,61 @@ constexpr Grain kGrain[] = {
      {{1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}, {1.0F, 1.0F, 0.0F}}},
 };
 
+constexpr int kMaterials = static_cast<int>(std::size(kGrain));
+
+/// One layer of all materials, to be looked up by the number of a material.
+struct LayerTable {
+  float per_s[kMaterials], per_t[kMaterials], amplitude[kMaterials];  // one over the sizes
+};
+
+constexpr LayerTable table_of(const Layer& (*layer)(const Grain&, int), int k) {
+  LayerTable out{};
+  for (int m = 0; m < kMaterials; ++m) {
+    const Layer& l = layer(kGrain[m], k);
+    out.per_s[m] = 1.0F / l.size_s;
+    out.per_t[m] = 1.0F / l.size_t;
+    out.amplitude[m] = l.amplitude;
+  }
+  return out;
+}
+constexpr const Layer& smooth_layer(const Grain& g, int k) { return g.smooth[k]; }
+constexpr const Layer& patch_layer(const Grain& g, int k) { return g.patch[k]; }
+constexpr LayerTable kSmoothTables[kSmooth] = {table_of(smooth_layer, 0), table_of(smooth_layer, 1),
+                                               table_of(smooth_layer, 2)};
+constexpr LayerTable kPatchTables[kPatches] = {table_of(patch_layer, 0), table_of(patch_layer, 1),
+                                               table_of(patch_layer, 2)};
+
+/// A layer under each lane.
+struct LayerLanes {
+  F8 per_s, per_t, amplitude;
+  F8 wx, wy;  ///< footprint in cells
+};
+
+LayerLanes layer_under(const SurfaceLanes& p, bool one_material, const LayerTable& table) {
+  LayerLanes l;
+  if (one_material) {
+    const auto m = static_cast<std::size_t>(p.material[0]);
+    l.per_s = splat(table.per_s[m]);
+    l.per_t = splat(table.per_t[m]);
+    l.amplitude = splat(table.amplitude[m]);
+  } else {
+    l.per_s = look_up(table.per_s, p.material);
+    l.per_t = look_up(table.per_t, p.material);
+    l.amplitude = look_up(table.amplitude, p.material);
+  }
+  l.wx = p.width_s * l.per_s;
+  l.wy = p.width_t * l.per_t;
+  return l;
+}
+
 /// A layer's cell under each lane.
 struct Cells {
   I8 x, y;    ///< lattice numbers, the same from every block
   F8 fx, fy;  ///< place in the cell, 0 to 1
-  F8 wx, wy;  ///< footprint in cells
-  F8 amplitude;
-};
-
-/// The layers of eight lanes.
-struct LayerLanes {
-  F8 per_s, per_t, amplitude;  // one over the sizes
 };
 
 Cells cells_of(const SurfaceLanes& p, const LayerLanes& layer) {
   Cells c;
-  c.amplitude = layer.amplitude;
   const F8 x = p.s * layer.per_s;
   const F8 y = p.t * layer.per_t;
   const I8 ix = floor_int(x);
@@ -99,53 +140,38 @@ Cells cells_of(const SurfaceLanes& p, const LayerLanes& layer) {
   c.y = add_wrapping(iy, multiply_wrapping(p.block_t, to_int(kBlock * layer.per_t)));
   c.fx = x - to_float(ix);
   c.fy = y - to_float(iy);
-  c.wx = p.width_s * layer.per_s;
-  c.wy = p.width_t * layer.per_t;
   return c;
 }
 
 /// Value noise, zero mean: the lattice points' random values, joined smoothly.
-F8 smooth_noise(const Cells& c, U8 key) {
-  const F8 keep = clamp01(1.25F - c.wx) * clamp01(1.25F - c.wy);
+F8 smooth_noise(const SurfaceLanes& p, const LayerLanes& layer, U8 key) {
+  const F8 keep = clamp01(1.25F - layer.wx) * clamp01(1.25F - layer.wy);
   if (!any(keep > 0.0F)) return splat(0.0F);
+  const Cells c = cells_of(p, layer);
   const F8 ease_x = c.fx * c.fx * (3.0F - 2.0F * c.fx);
   const F8 ease_y = c.fy * c.fy * (3.0F - 2.0F * c.fy);
   const I8 x = add_wrapping(c.x, I8{} + 1);  // the far corner
   const I8 y = add_wrapping(c.y, I8{} + 1);
   const F8 low = mix(fraction(hash_cell(c.x, c.y, key), 0), fraction(hash_cell(x, c.y, key), 0), ease_x);
   const F8 high = mix(fraction(hash_cell(c.x, y, key), 0), fraction(hash_cell(x, y, key), 0), ease_x);
-  return c.amplitude * keep * (2.0F * mix(low, high, ease_y) - 1.0F);
+  return layer.amplitude * keep * (2.0F * mix(low, high, ease_y) - 1.0F);
 }
 
 /// In two of three cells a rectangle of random place, size and shade.
-F8 patches(const Cells& c, U8 key) {
-  const F8 keep = clamp01(2.0F - 2.0F * c.wx) * clamp01(2.0F - 2.0F * c.wy);
+F8 patches(const SurfaceLanes& p, const LayerLanes& layer, U8 key) {
+  const F8 keep = clamp01(2.0F - 2.0F * layer.wx) * clamp01(2.0F - 2.0F * layer.wy);
   if (!any(keep > 0.0F)) return splat(0.0F);
+  const Cells c = cells_of(p, layer);
   const U8 h = hash_cell(c.x, c.y, key);
   const U8 g = mix_bits(h + 0x9E3779B9U);
   const F8 left = 0.06F + 0.45F * fraction(h, 0);
   const F8 bottom = 0.06F + 0.45F * fraction(h, 8);
-  const F8 covered = coverage(c.fx, c.wx, left, left + 0.12F + 0.30F * fraction(h, 16)) *
-                     coverage(c.fy, c.wy, bottom, bottom + 0.12F + 0.30F * fraction(h, 24));
+  const F8 covered = coverage(c.fx, layer.wx, left, left + 0.12F + 0.30F * fraction(h, 16)) *
+                     coverage(c.fy, layer.wy, bottom, bottom + 0.12F + 0.30F * fraction(h, 24));
   const F8 shade = 2.0F * fraction(g, 0) - 1.0F;
   return select(fraction(g, 8) < 0.66F,
-                c.amplitude * keep * covered * (shade + select(shade < 0.0F, splat(-0.5F), splat(0.5F))), splat(0.0F));
-}
-
-/// One lane after the other, or all at once where one material fills them.
-LayerLanes layers_of(const SurfaceLanes& p, bool one_material, const Layer& (*layer)(const Grain&, int), int k) {
-  LayerLanes out;
-  if (one_material) {
-    const Layer& l = layer(kGrain[p.material[0]], k);
-    return {splat(1.0F / l.size_s), splat(1.0F / l.size_t), splat(l.amplitude)};
-  }
-  for (int i = 0; i < kLanes; ++i) {
-    const Layer& l = layer(kGrain[p.material[i]], k);
-    out.per_s[i] = 1.0F / l.size_s;
-    out.per_t[i] = 1.0F / l.size_t;
-    out.amplitude[i] = l.amplitude;
-  }
-  return out;
+                layer.amplitude * keep * covered * (shade + select(shade < 0.0F, splat(-0.5F), splat(0.5F))),
+                splat(0.0F));
 }
 
 }  // namespace
@@ -155,16 +181,10 @@ F8 albedo(const SurfaceLanes& p) {
   F8 base;
   for (int i = 0; i < kLanes; ++i) base[i] = kGrain[p.material[i]].albedo;
   F8 speckle = splat(0.0F);
-  for (int k = 0; k < kSmooth; ++k) {
-    const auto layer = layers_of(
-        p, one_material, [](const Grain& g, int n) -> const Layer& { return g.smooth[n]; }, k);
-    speckle += smooth_noise(cells_of(p, layer), p.key + static_cast<std::uint32_t>(k));
-  }
-  for (int k = 0; k < kPatches; ++k) {
-    const auto layer = layers_of(
-        p, one_material, [](const Grain& g, int n) -> const Layer& { return g.patch[n]; }, k);
-    speckle += patches(cells_of(p, layer), p.key + static_cast<std::uint32_t>(k + kSmooth));
-  }
+  for (std::uint32_t k = 0; k < kSmooth; ++k)
+    speckle += smooth_noise(p, layer_under(p, one_material, kSmoothTables[k]), p.key + k);
+  for (std::uint32_t k = 0; k < kPatches; ++k)
+    speckle += patches(p, layer_under(p, one_material, kPatchTables[k]), p.key + k + kSmooth);
   return clamp(paint(p, base * p.tint, speckle), splat(0.01F), splat(0.95F));
 }
 
