@@ -35,7 +35,7 @@ ChannelSlots Fusion::slots(FusionChannel c) {
     case FusionChannel::kIns:
       break;
   }
-  return {kInsClone, std::nullopt, std::nullopt, kInsVelocity};
+  return {kInsClone, std::nullopt, kInsDrift, kInsVelocity};
 }
 
 double Fusion::timeout(FusionChannel c) const {
@@ -56,6 +56,11 @@ void Fusion::set_gnss(int64_t t_us, bool present) {
   if (gnss_ && !present) refuse_fix(comeback_);
   gnss_ = present;
   ::roadfix::set_gnss(ramp_, config_.adaptive, t_us, present);
+}
+
+void Fusion::set_ins_gyro(const Eigen::Vector3d& bias_std, const YawPitchRoll& mounting) {
+  const Eigen::RowVector3d up = quaternion(mounting).toRotationMatrix().row(2);
+  ins_drift_std_ = up.cwiseProduct(bias_std.transpose()).norm();
 }
 
 FuseStatus Fusion::add(const ChannelSample& s) {
@@ -141,11 +146,13 @@ void Fusion::start(const ChannelSample& s) {
   set_independent(e, kVoDrift, 0.0, config_.vo_drift_std);
   set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
   for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::sqrt(s.odometry.cov_velocity(0, 0)));
+  set_independent(e, kInsDrift, 0.0, ins_drift_std_);
   for (const int clone : {int{kInsClone}, int{kVoClone}, int{kWheelClone}}) clone_pose(e, clone);
   for (Mode& mode : imm_.modes) mode.estimate = e;
   now_ = e;
   started_ = true;
   placed_ = enu;
+  foreign_ = !enu;
 }
 
 /// The first enu pose of a fusion that runs in a local frame: position and yaw are taken over, what was learnt stays.
@@ -162,6 +169,7 @@ void Fusion::place(const Odometry& o) {
   now_ = combine(imm_);
   tie_.forget();
   placed_ = true;
+  foreign_ = false;
 }
 
 /// Mixing and prediction to t_us, in steps that the models are good for.

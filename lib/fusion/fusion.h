@@ -14,6 +14,7 @@
 #include "fusion/fusion_config.h"
 #include "fusion/imm.h"
 #include "fusion/measurement.h"
+#include "geometry/euler.h"
 #include "samples/samples.h"
 #include "stream/state_bytes.h"
 
@@ -71,6 +72,10 @@ class Fusion {
   /// What the INS says about GNSS: present (aided by it lately) or lost. For ramps, tie and status.
   void set_gnss(int64_t t_us, bool present);
 
+  /// What the INS says about its gyro: standard deviation of its bias by axis, rad/s, and how the axes lie in the
+  /// vehicle. Its yaw drifts with that. Never said, or zero: its yaw errors are a sum of independent steps.
+  void set_ins_gyro(const Eigen::Vector3d& bias_std, const YawPitchRoll& mounting);
+
   /// Fuses one sample; the state moves to its time. Older samples are refused.
   FuseStatus add(const ChannelSample& sample);
 
@@ -84,7 +89,8 @@ class Fusion {
     FusionChannel channel = FusionChannel::kIns;
     bool metric = true;
     const Odometry* felt = nullptr;  ///< the channel's newest pose, for its velocities and attitude
-    LevelView view;                  ///< of that pose
+    double corrected = 0.0;  ///< m: the largest step by which the channel's pose differs from its velocities' motion
+    LevelView view;          ///< of that pose
   };
   struct Poses {
     Odometry fused;  ///< POSE_FUSED, enu
@@ -117,6 +123,7 @@ class Fusion {
     int reset_counter = 0;
     bool shares_imu = false;
     Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();  ///< m2/s2, in enu, of the INS at its last sample
+    double drift_variance = 0.0;     ///< rad2/s2, of its yaw rate at its last sample, for the INS
     double yaw_rate_variance = 0.0;  ///< rad2/s, of its motion lately: which of two that share a gyro is better
     std::optional<int64_t> alive_us;
     ConsistencyCheck check;
@@ -138,6 +145,7 @@ class Fusion {
     double turn = 0.0;
   };
 
+  [[nodiscard]] bool follows(const Ahead& ahead) const;
   [[nodiscard]] Forward forward(const Ahead& ahead) const;
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visitor);
@@ -159,10 +167,12 @@ class Fusion {
   FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, FusionChannelReport& report);
   [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
-  void follow_velocity_error(const Odometry& ins);
+  void follow_ins_errors(const Odometry& ins);
   void fuse_rates(const ChannelSample& sample, const LevelView& view);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
                        FusionChannelReport& report);
+  FuseStatus follow_ins(const PlanarEstimate& known, const LevelView& view, FusionChannelReport& report);
+  void count_fix(const Planar& correction);
   [[nodiscard]] bool vision_speaks() const;
   void apply_gain(const FusionMeasurement<3>& gain);
   void distrust_velocity(const Planar& difference);
@@ -181,6 +191,9 @@ class Fusion {
     FusionInnovation<M> innovation;
     Eigen::Matrix<double, M, 1> difference = Eigen::Matrix<double, M, 1>::Zero();
   };
+  template <int M>
+  static void add(Mean<M>& mean, double share, const FusionInnovation<M>& innovation,
+                  const Eigen::Matrix<double, M, 1>& difference);
   template <int M, class At>
   Mean<M> update(const At& at);  ///< at(x): the measurement linearised there
   static void tell(const FusionInnovation<3>& innovation, const Eigen::Vector3d& difference,
@@ -199,6 +212,7 @@ class Fusion {
   double height_variance_ = 1.0;  ///< m2
   Odometry attitude_;             ///< newest roll and pitch, with their covariance
   bool gnss_ = false;
+  double ins_drift_std_ = 0.0;  ///< rad/s
   DropoutRamp ramp_;
   FrameTie tie_;
   AgreementState agreement_;
@@ -206,6 +220,7 @@ class Fusion {
   std::optional<int64_t> restart_us_;
   std::optional<int64_t> refused_since_us_;
   std::optional<int64_t> last_fix_us_;
+  bool foreign_ = false;        ///< something in the pose did not come through the INS
   bool ins_corrected_ = false;  ///< the INS used a fix since its last sample
   int passes_needed_ = 0;       ///< fixes that must pass the gate before absolute poses are used again
   double distrust_ = 0.0;       ///< m/s, of the INS velocity after a contradiction

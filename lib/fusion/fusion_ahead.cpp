@@ -46,6 +46,12 @@ Odometry full_pose(int64_t t_us, const Planar& pose, const Eigen::Matrix3d& P, d
 
 }  // namespace
 
+/// The fusion knows nothing that the INS does not know, and publishes its corrections as they are: so it would here.
+bool Fusion::follows(const Ahead& a) const {
+  return placed_ && !foreign_ && config_.scheme == FusionScheme::kRelative && a.channel == FusionChannel::kIns &&
+         a.felt != nullptr && a.silent <= 0.0 && a.corrected <= config_.comeback.ignored && comeback_.residual.isZero();
+}
+
 /// (F.14), (F.15): the channel's motion less what is known of its errors, and its own noise.
 Fusion::Forward Fusion::forward(const Ahead& a) const {
   const Vector& x = now_.x;
@@ -55,6 +61,14 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   f.speed_variance = now_.P(kSpeed, kSpeed);
   f.turn = x(kTurn);
   if (a.dt <= 0.0) return f;
+  if (follows(a)) {
+    f.planar = {a.view.pose, a.view.P};
+    f.way = a.way;
+    f.speed = a.felt->velocity.x();
+    f.speed_variance = a.felt->cov_velocity(0, 0);
+    f.turn = a.view.turn;
+    return f;
+  }
   const ChannelSlots s = slots(a.channel);
   const bool told = a.felt != nullptr && (a.metric || !vo_scale_open_);
   const double silent = told ? a.silent : a.dt, heard = a.dt - silent;
@@ -97,7 +111,8 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   f.planar.P.diagonal() += Eigen::Vector3d(sigma * sigma, sigma * sigma, least.yaw * least.yaw * a.dt);
   f.planar.P(2, 2) += config_.turn_sigma * config_.turn_sigma * silent * silent;
   const double wander = config_.motion.jerk * silent;  // of a speed that nobody tells
-  f.speed_variance = P(3, 3) + config_.speed_sigma * config_.speed_sigma + wander * wander;
+  f.speed_variance = P(3, 3) + wander * wander;
+  if (!s.velocity || silent > 0.0) f.speed_variance += config_.speed_sigma * config_.speed_sigma;
   return f;
 }
 

@@ -107,8 +107,8 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
         self.ramp_.level_at_change, self.agreement_.agrees, self.agreement_.count);
   visit_odometry(self.attitude_, visit);
   FrameTie::visit_members(self.tie_, visit);
-  visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.ins_corrected_, self.passes_needed_,
-        self.distrust_, self.last_tie_us_, self.vo_scale_open_);
+  visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.foreign_, self.ins_corrected_,
+        self.passes_needed_, self.distrust_, self.ins_drift_std_, self.last_tie_us_, self.vo_scale_open_);
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);
@@ -118,8 +118,8 @@ void Fusion::save(StateWriter& writer) const {
   const auto put = [&](const auto&... members) { (write(writer, members), ...); };
   visit_members(*this, put);
   for (const Memory& m : memories_) {
-    put(m.reset_counter, m.velocity_covariance, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio,
-        m.last.has_value());
+    put(m.reset_counter, m.velocity_covariance, m.drift_variance, m.yaw_rate_variance, m.shares_imu, m.alive_us,
+        m.check.ratio, m.last.has_value());
     if (m.last) visit_odometry(*m.last, put);
   }
   put(restart_.has_value());
@@ -134,7 +134,8 @@ void Fusion::load(StateReader& reader) {
   visit_members(*this, get);
   for (Memory& m : memories_) {
     bool has = false;
-    get(m.reset_counter, m.velocity_covariance, m.yaw_rate_variance, m.shares_imu, m.alive_us, m.check.ratio, has);
+    get(m.reset_counter, m.velocity_covariance, m.drift_variance, m.yaw_rate_variance, m.shares_imu, m.alive_us,
+        m.check.ratio, has);
     m.last.reset();
     if (!has) continue;
     visit_odometry(m.last.emplace(), get);

@@ -91,6 +91,14 @@ FusionInnovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double,
   return {nis, -0.5 * (nis + log_det + M * std::log(2.0 * kPi)), S.diagonal()};
 }
 
+FusionInnovation<3> likelihood(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S) {
+  const Eigen::LLT<Eigen::Matrix3d> llt(S);
+  if (llt.info() != Eigen::Success) return {};
+  const double nis = llt.matrixL().solve(innovation).squaredNorm();
+  const double log_det = 2.0 * std::log(llt.matrixLLT().diagonal().prod());
+  return {nis, -0.5 * (nis + log_det + 3.0 * std::log(2.0 * kPi)), S.diagonal()};
+}
+
 template <int M>
 FusionInnovation<M> judge(const FusionEstimate& e, const Eigen::Matrix<double, M, kSize>& H,
                           const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R) {

@@ -20,7 +20,8 @@ enum Index {
   kVoDrift = 16,      ///< rad/s, measured yaw rate less true
   kWheelScale = 17,   ///< likewise
   kInsVelocity = 18,  ///< m/s, east and north: error of the INS velocity, which lasts through an outage
-  kSize = 20
+  kInsDrift = 20,     ///< rad/s, measured yaw rate of the INS less true: its gyro bias' error
+  kSize = 21
 };
 
 inline constexpr int kYaws[] = {kYaw, kInsClone + 2, kVoClone + 2, kWheelClone + 2};
@@ -60,6 +61,9 @@ struct FusionInnovation {
 template <int M>
 FusionInnovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double, M, fusion::kSize>& H,
                                   const Eigen::Matrix<double, M, 1>& innovation, const Eigen::Matrix<double, M, M>& R);
+
+/// Of an innovation with this covariance.
+FusionInnovation<3> likelihood(const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S);
 
 /// The same without changing e, and without the likelihood: for gates.
 template <int M>

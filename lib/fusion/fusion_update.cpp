@@ -19,8 +19,6 @@ constexpr double kFixSpacing = 0.05;       ///< s: corrections closer than this 
 constexpr double kCorrected = 0.01;        ///< share of a variance that an INS loses by a fix at least
 constexpr double kDistrustTime = 5.0;      ///< s, in which distrust of the INS velocity fades
 constexpr double kWrongFor = 1.0;          ///< s: a position that is wrong by d may come with a speed wrong by d / this
-constexpr double kTieSpacing = 1.0;  ///< s: the tie's comparisons are that far apart, for their errors' correlation
-constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 
 /// The INS has used a fix since its last sample: something of its pose became surer.
 bool corrected(const LevelView& last, const LevelView& now) {
@@ -28,6 +26,14 @@ bool corrected(const LevelView& last, const LevelView& now) {
 }
 
 }  // namespace
+
+template <int M>
+void Fusion::add(Mean<M>& mean, double share, const FusionInnovation<M>& innovation,
+                 const Eigen::Matrix<double, M, 1>& difference) {
+  mean.innovation.nis += share * innovation.nis;
+  mean.innovation.variance += share * innovation.variance;
+  mean.difference += share * difference;
+}
 
 template <int M, class At>
 Fusion::Mean<M> Fusion::update(const At& at) {
@@ -37,10 +43,7 @@ Fusion::Mean<M> Fusion::update(const At& at) {
     const FusionMeasurement<M> m = at(mode.estimate.x);
     const FusionInnovation<M> innovation = kalman_update<M>(mode.estimate, m.H, m.innovation, m.R);
     mode.log_likelihood += innovation.log_likelihood;
-    const double share = imm_.probability(static_cast<Eigen::Index>(i));
-    mean.innovation.nis += share * innovation.nis;
-    mean.innovation.variance += share * innovation.variance;
-    mean.difference += share * m.innovation;
+    add(mean, imm_.probability(static_cast<Eigen::Index>(i)), innovation, m.innovation);
   }
   return mean;
 }
@@ -83,13 +86,15 @@ bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const
          memory(other).yaw_rate_variance < variance;
 }
 
-/// The INS velocity's error lasts while nothing corrects it: its variance grows as the INS says; where the INS says
-/// that it shrank, the INS has corrected it, and what was known of it is void.
-void Fusion::follow_velocity_error(const Odometry& ins) {
+/// The errors of the INS velocity and of its gyro last while nothing corrects them: their variances grow as the INS
+/// says; where the INS says that they shrank, the INS has corrected them, and what was known of them is void.
+void Fusion::follow_ins_errors(const Odometry& ins) {
   const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
   const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
   Eigen::Matrix2d& last = memory(FusionChannel::kIns).velocity_covariance;
-  const bool redone = ins_corrected_ || P.trace() < (1.0 - kCorrected) * last.trace();
+  const double drift_variance = ins_drift_std_ * ins_drift_std_;
+  double& last_drift = memory(FusionChannel::kIns).drift_variance;
+  const bool redone = ins_corrected_ || !foreign_ || P.trace() < (1.0 - kCorrected) * last.trace();
   distrust_ *= std::exp(-seconds_between(memory(FusionChannel::kIns).last->t_us, t_us_) / kDistrustTime);
   for (Mode& mode : imm_.modes) {
     for (int i = 0; i < 2; ++i) {
@@ -99,8 +104,13 @@ void Fusion::follow_velocity_error(const Odometry& ins) {
         mode.estimate.P(kInsVelocity + i, kInsVelocity + i) += std::max(0.0, P(i, i) - last(i, i));
       }
     }
+    if (redone)
+      set_independent(mode.estimate, kInsDrift, 0.0, ins_drift_std_);
+    else
+      mode.estimate.P(kInsDrift, kInsDrift) += std::max(0.0, drift_variance - last_drift);
   }
   last = P;
+  last_drift = drift_variance;
 }
 
 FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, FusionChannelReport& report) {
@@ -126,13 +136,14 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
   const Planar motion = motion_of(s.channel, m.view, view);
   if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
 
-  if (ins) follow_velocity_error(s.odometry);
+  if (ins) follow_ins_errors(s.odometry);
   const MotionFloor& f = floor(s.channel);
   const double sigma = f.position * std::sqrt(dt) + f.share * motion.head<2>().norm();
   const double yaw_sigma = f.yaw * std::sqrt(dt);
   Eigen::Matrix3d R;
-  if (ins) {  // its positions' growth is that of the velocity's error, a state here
-    const double yaw_growth = std::max(yaw_sigma * yaw_sigma, view.P(2, 2) - m.view.P(2, 2));
+  if (ins) {  // its positions' growth is that of the velocity's error, its yaw's that of the gyro's: states here
+    const double grown = ins_drift_std_ > 0.0 ? 0.0 : view.P(2, 2) - m.view.P(2, 2);
+    const double yaw_growth = std::max(yaw_sigma * yaw_sigma, grown);
     R = Eigen::Vector3d(sigma * sigma, sigma * sigma, yaw_growth).asDiagonal();
   } else {
     R = motion_covariance(m.view.pose, m.view.P, motion, view.P, {sigma, sigma, yaw_sigma});
@@ -144,6 +155,18 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
     R(2, 2) = kUninformative;
   }
   const ChannelSlots where = slots(s.channel);
+  if (ins) {
+    const bool with_yaw = R(2, 2) < kUninformative;
+    Mean<3> mean;
+    for (std::size_t i = 0; i < kModes; ++i) {
+      Mode& mode = imm_.modes[i];
+      const CarriedOn told = carry_on(mode.estimate, where, motion, dt, R, with_yaw);
+      mode.log_likelihood += told.innovation.log_likelihood;
+      add(mean, imm_.probability(static_cast<Eigen::Index>(i)), told.innovation, told.difference);
+    }
+    tell(mean.innovation, mean.difference, report);
+    return FuseStatus::kAccepted;
+  }
   if (s.channel == FusionChannel::kVo) {
     const FusionMeasurement<3> at = relative_motion(now_.x, where, motion, dt, R);
     tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
@@ -153,6 +176,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
   }
   const Mean<3> used = update<3>([&](const Vector& x) { return relative_motion(x, where, motion, dt, R); });
   tell(used.innovation, used.difference, report);
+  foreign_ = true;
   return FuseStatus::kAccepted;
 }
 
@@ -160,7 +184,12 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
 void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view) {
   if (s.channel != FusionChannel::kIns && alive(FusionChannel::kIns)) return;
   if (s.channel == FusionChannel::kVo && !agreement_.agrees) return;
+  std::array<double, kModes> told{};
+  for (std::size_t i = 0; i < kModes; ++i) told[i] = imm_.modes[i].log_likelihood;
   update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
+  if (s.channel == FusionChannel::kIns && memory(s.channel).last) {  // the motion has told the turn already
+    for (std::size_t i = 0; i < kModes; ++i) imm_.modes[i].log_likelihood = told[i];
+  }
   if (!s.metric) return;
   const double lasting = s.channel == FusionChannel::kIns ? 0.0 : s.odometry.cov_velocity(0, 0);
   const double variance = lasting + config_.speed_sigma * config_.speed_sigma;
@@ -181,6 +210,7 @@ bool Fusion::vision_speaks() const {
 FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, const PlanarEstimate& known,
                              FusionChannelReport& report) {
   gain_height(s.odometry);
+  if (!foreign_) return follow_ins(known, view, report);
   std::optional<FusionMeasurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
@@ -211,6 +241,32 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
   return status;
 }
 
+/// While all that the fusion knows of its place came through the INS, the INS knows as much and more: its pose, in
+/// every direction, with its covariance.
+FuseStatus Fusion::follow_ins(const PlanarEstimate& known, const LevelView& view, FusionChannelReport& report) {
+  const Planar correction = difference_of(view.pose, known.pose);
+  const std::optional<FusionMeasurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
+  for (Mode& mode : imm_.modes) {
+    FusionEstimate& e = mode.estimate;
+    if (gain) {  // what is correlated with the pose learns
+      FusionMeasurement<3> m = *gain;
+      m.innovation += gain->H.middleCols<3>(kPos) * difference_of(known.pose, e.x.segment<3>(kPos));
+      (void)kalman_update<3>(e, m.H, m.innovation, m.R);
+    }
+    e.x.segment<3>(kPos) = view.pose;
+    e.P.block<3, 3>(kPos, kPos) = view.P;
+  }
+  const Eigen::Matrix3d S = known.P + view.P;
+  report.nis = correction.dot(S.ldlt().solve(correction));
+  report.dof = 3;
+  report.innovation = correction;
+  report.innovation_variance = S.diagonal();
+  count_fix(correction);
+  refused_since_us_.reset();
+  passes_needed_ = 0;
+  return report.nis > config_.gate ? FuseStatus::kReset : FuseStatus::kAccepted;
+}
+
 void Fusion::apply_gain(const FusionMeasurement<3>& gain) {
   const FusionEstimate before = now_;
   update<3>([&](const Vector& x) {
@@ -219,7 +275,13 @@ void Fusion::apply_gain(const FusionMeasurement<3>& gain) {
     return m;
   });
   now_ = combine(imm_);
-  const Planar correction = difference(now_.x, before.x).segment<3>(kPos);
+  // Taken over in every direction: nothing is left that the INS does not know.
+  foreign_ = gain.R.diagonal().maxCoeff() >= kUninformative;
+  count_fix(difference(now_.x, before.x).segment<3>(kPos));
+}
+
+/// A correction of the filter's own pose; by a fix where the INS used one.
+void Fusion::count_fix(const Planar& correction) {
   const bool fix = gnss_ && ins_corrected_;
   const bool same_fix = last_fix_us_ && seconds_between(*last_fix_us_, t_us_) < kFixSpacing;
   take_fix(comeback_, config_.comeback, correction, fix && !same_fix);
@@ -294,52 +356,6 @@ void Fusion::weigh(FusionChannel c, double information) {
   double sum = 0.0;
   for (const double share : information_) sum += share;
   for (std::size_t k = 0; k < information_.size(); ++k) reports_[k].weight = sum > 0.0 ? information_[k] / sum : 0.0;
-}
-
-/// The tie follows the vision always, and learns from the fused pose while GNSS is there.
-void Fusion::update_tie(const ChannelSample& s) {
-  const SE3& T_vo_vehicle = s.odometry.T_frame_vehicle;
-  Odometry here = fused();
-  Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();
-  cov.topLeftCorner<2, 2>() = now_.P.block<2, 2>(kPos, kPos);
-  cov(2, 2) = height_variance_;
-  cov(3, 3) = now_.P(kYaw, kYaw) + 0.01 * kTieFloor * kTieFloor;
-  cov.diagonal().head<3>().array() += kTieFloor * kTieFloor;
-  const bool known = placed_ && gnss_ && agreement_.agrees;
-  if (!tie_.valid()) {
-    if (!known) return;
-    tie_.start(T_vo_vehicle, here.T_frame_vehicle, cov, config_.tie);
-    last_tie_us_ = t_us_;
-    return;
-  }
-  tie_.move_to(T_vo_vehicle, config_.tie);
-  if (!known || seconds_between(*last_tie_us_, t_us_) < kTieSpacing) return;
-  tie_.correct(T_vo_vehicle, here.T_frame_vehicle, cov);
-  last_tie_us_ = t_us_;
-}
-
-/// Paper B: vision starts again at the pose that the others agree on. Needs the tie, and somebody else who is alive.
-void Fusion::ask_restart(const char* reason) {
-  const bool others = alive(FusionChannel::kIns) || alive(FusionChannel::kWheel);
-  const bool lately = restart_us_ && seconds_between(*restart_us_, t_us_) < config_.restart_every;
-  if (!tie_.valid() || !others || lately) return;
-  const Odometry here = fused();
-  VisionRestart r;
-  r.T_vo_vehicle = tie_.to_vo(here.T_frame_vehicle);
-  r.velocity = here.velocity;
-  const Eigen::Matrix3d R_vo_enu = quaternion({-tie_.yaw(), 0.0, 0.0}).toRotationMatrix() / tie_.scale();
-  r.cov_pose = here.cov_pose;
-  r.cov_pose.topRows<3>() = (R_vo_enu * r.cov_pose.topRows<3>()).eval();
-  r.cov_pose.leftCols<3>() = (r.cov_pose.leftCols<3>() * R_vo_enu.transpose()).eval();
-  r.reason = reason;
-  restart_ = r;
-  restart_us_ = t_us_;
-}
-
-std::optional<VisionRestart> Fusion::take_restart() {
-  std::optional<VisionRestart> taken;
-  taken.swap(restart_);
-  return taken;
 }
 
 }  // namespace roadfix

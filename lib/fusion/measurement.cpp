@@ -73,6 +73,47 @@ FusionMeasurement<3> relative_motion(const Vector& x, const ChannelSlots& slots,
   return m;
 }
 
+CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
+                   const Eigen::Matrix3d& R, bool with_yaw) {
+  const int n = with_yaw ? 3 : 2;
+  const Planar clone = e.x.segment<3>(slots.clone);
+  const Eigen::Matrix3d A = after_motion_by_start(clone, motion);
+  Planar next = after_motion(clone, motion);
+  Eigen::Matrix<double, 3, kSize> rows = A * e.P.middleRows<3>(slots.clone);  // cov(next, x)
+  if (slots.velocity) {
+    next.head<2>() -= dt * e.x.segment<2>(*slots.velocity);
+    rows.topRows<2>() -= dt * e.P.middleRows<2>(*slots.velocity);
+  }
+  if (slots.drift) {
+    next.z() = wrap_angle(next.z() - dt * e.x(*slots.drift));
+    rows.row(2) -= dt * e.P.row(*slots.drift);
+  }
+  Eigen::Matrix3d P = rows.middleCols<3>(slots.clone) * A.transpose();
+  if (slots.velocity) P.leftCols<2>() -= dt * rows.middleCols<2>(*slots.velocity);
+  if (slots.drift) P.col(2) -= dt * rows.col(*slots.drift);
+  const Eigen::Matrix3d to_frame = motion_by_end(clone).transpose();
+  P += to_frame * R * to_frame.transpose();
+  CarriedOn told;
+  told.difference = difference_of(next, e.x.segment<3>(kPos));
+  const Eigen::Matrix3d with_predicted = rows.middleCols<3>(kPos);
+  Eigen::Matrix3d S = e.P.block<3, 3>(kPos, kPos) + P - with_predicted - with_predicted.transpose();
+  S = 0.5 * (S + S.transpose()).eval();
+  told.innovation = likelihood(told.difference, S);
+  for (int i = 0; i < n; ++i) {
+    e.x(kPos + i) = next(i);
+    e.P.row(kPos + i) = rows.row(i);
+    e.P.col(kPos + i) = rows.row(i).transpose();
+  }
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) e.P(kPos + i, kPos + j) = 0.5 * (P(i, j) + P(j, i));
+  if (!with_yaw) {  // the yaw that stays is correlated with the clone's
+    const Eigen::Vector2d with = rows.topRows<2>().col(kYaw);
+    e.P.block<2, 1>(kPos, kYaw) = with;
+    e.P.block<1, 2>(kYaw, kPos) = with.transpose();
+  }
+  return told;
+}
+
 std::optional<FusionMeasurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose,
                                                 const Eigen::Matrix3d& P_pose, double least_gain) {
   const Eigen::Matrix3d no_gain = P_pose - (1.0 - least_gain) * e.P;

@@ -44,6 +44,16 @@ Planar predicted_motion(const fusion::Vector& x, const ChannelSlots& slots, doub
 FusionMeasurement<3> relative_motion(const fusion::Vector& x, const ChannelSlots& slots, const Planar& motion,
                                      double dt, const Eigen::Matrix3d& R);
 
+/// The state after a channel's motion since its clone, of which no motion model knows as much: the place (and the yaw,
+/// if `with_yaw`) is the clone's, carried on (F.11b). R in the axes of the clone. What the model had predicted is told
+/// apart: for its likelihood.
+struct CarriedOn {
+  FusionInnovation<3> innovation;                        ///< of the model's prediction
+  Eigen::Vector3d difference = Eigen::Vector3d::Zero();  ///< carried less predicted
+};
+CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
+                   const Eigen::Matrix3d& R, bool with_yaw);
+
 /// What `pose` with covariance `P_pose` knows beyond `e`, if all that e knows about absolute position were part of it
 /// (F.13): along the directions in which P_pose is smaller by at least `least_gain`, the measurement that takes e to
 /// the pose and its covariance. kUninformative in the others. Nothing where no direction gained.

@@ -29,6 +29,7 @@ void Outlook::see(const ChannelSample& s) {
     if (before->known && step.known && before->channel == step.channel && dt < kLongestGap) {
       const FeltMotion m = motion_by_velocity(before->view, step.view);
       step.way = after_motion(step.way, m.way);
+      step.corrected = (step.view.pose - after_motion(before->view.pose, m.way)).head<2>().norm();
       step.rise += m.rise;
     } else {
       step.silent += dt;
@@ -68,6 +69,7 @@ Fusion::Poses Outlook::poses(const Fusion& fusion) const {
   a.rise += newest.rise - first.rise;
   a.silent += newest.silent - first.silent;
   if (newest.known) a.felt = &newest.felt;
+  for (const Step& step : ahead_) a.corrected = std::max(a.corrected, step.corrected);
   a.view = newest.view;
   return fusion.carried(a);
 }

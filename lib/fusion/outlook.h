@@ -32,8 +32,9 @@ class Outlook {
     Odometry felt;
     LevelView view;  ///< of felt
     Planar way = Planar::Zero();
-    double rise = 0.0;    ///< m
-    double silent = 0.0;  ///< s in which nobody told the motion
+    double rise = 0.0;       ///< m
+    double silent = 0.0;     ///< s in which nobody told the motion
+    double corrected = 0.0;  ///< m, by which the sample's place is not where the velocities lead
   };
 
   template <class Self, class Visitor>

@@ -60,6 +60,11 @@ Odometry in_other_frame(const SE3& T_other_frame, const Odometry& o) {
   return moved;
 }
 
+Planar difference_of(const Planar& a, const Planar& b) {
+  const Planar d = a - b;
+  return {d.x(), d.y(), wrap_angle(d.z())};
+}
+
 Planar motion_between(const Planar& a, const Planar& b) {
   const Eigen::Vector2d d = rotation(-a.z()) * (b - a).head<2>();
   return {d.x(), d.y(), wrap_angle(b.z() - a.z())};

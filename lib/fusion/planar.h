@@ -27,6 +27,9 @@ LevelView level_view(const Odometry& odometry);
 /// The same pose in another frame.
 Odometry in_other_frame(const SE3& T_other_frame, const Odometry& odometry);
 
+/// a - b with the yaw the short way round.
+Planar difference_of(const Planar& a, const Planar& b);
+
 /// Motion from a to b in a's axes: forward, left, turn.
 Planar motion_between(const Planar& a, const Planar& b);
 /// The pose reached from a by a motion in a's axes.

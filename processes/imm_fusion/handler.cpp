@@ -66,7 +66,7 @@ class ImmFusionStage final : public Stage {
     outlook_.drop_until(m.utime);
     switch (m.input) {
       case kInsStatus:
-        fusion_.set_gnss(m.utime, (decode<ins_status_t>(m.bytes).aided_by & ins_status_t::AIDED_GNSS_POSITION) != 0);
+        take(decode<ins_status_t>(m.bytes));
         break;
       case kVoStatus:
         vo_shares_imu_ = decode<vo_status_t>(m.bytes).mode == vo_status_t::MODE_MSCKF;
@@ -78,7 +78,10 @@ class ImmFusionStage final : public Stage {
   }
 
   void on_clock(const Message& m) override {
-    outlook_.see(channel_sample(channel_of(m.input), decode<pose_t>(m.bytes), m.seq));
+    const pose_t message = decode<pose_t>(m.bytes);
+    ChannelSample sample = channel_sample(channel_of(m.input), message, m.seq);
+    if (sample.channel == FusionChannel::kIns && anchor_) to_first_anchor(anchor_of(message), sample.odometry);
+    outlook_.see(sample);
   }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
@@ -147,6 +150,12 @@ class ImmFusionStage final : public Stage {
   [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
+  void take(const ins_status_t& m) {
+    fusion_.set_gnss(m.utime, (m.aided_by & ins_status_t::AIDED_GNSS_POSITION) != 0);
+    fusion_.set_ins_gyro({m.gyro_bias_std_radps[0], m.gyro_bias_std_radps[1], m.gyro_bias_std_radps[2]},
+                         {m.mounting_rad[2], m.mounting_rad[1], m.mounting_rad[0]});
+  }
+
   void fuse(FusionChannel channel, const pose_t& message) {
     ChannelSample sample = channel_sample(channel, message, message.seq);
     sample.reset_counter = counts_[static_cast<std::size_t>(channel)].after(message);

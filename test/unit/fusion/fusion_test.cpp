@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "geometry/euler.h"
-#include "simulation/scenarios.h"
-#include "streams.h"
+#include "tunnel.h"
 
 namespace roadfix {
 
@@ -14,70 +13,12 @@ using namespace fusion;
 
 namespace {
 
-using test::InsNoise;
-using test::merged;
 using test::planar_error;
 using test::run;
+using test::seconds;
 using test::StreamEvent;
-using test::VoNoise;
-
-SimulatedDrive city(double duration_s) {
-  ScenarioConfig s = scenario("city_loop");
-  s.duration_s = duration_s;
-  s.imu.rate_hz = s.wheels.rate_hz = s.gnss.rate_hz = 1.0;
-  s.mag.rate_hz = 0.0;
-  return simulate(s, 3);
-}
-
-double seconds(const SimulatedDrive& drive, int64_t t_us) { return seconds_between(drive.config.start_utime, t_us); }
-
-/// An outage from 40 s to 100 s, vision alive.
-struct Tunnel {
-  SimulatedDrive drive = city(120.0);
-  InsNoise ins;
-  VoNoise vo;
-  bool with_wheels = true;
-  Tunnel() { ins.outages = {{40.0, 100.0}}; }
-  [[nodiscard]] std::vector<StreamEvent> events() const {
-    VoNoise wheels;
-    wheels.rate_hz = 20.0;
-    std::vector<std::vector<StreamEvent>> streams{ins_stream(drive, ins, 1), vo_stream(drive, vo, 1)};
-    if (with_wheels) streams.push_back(wheel_stream(drive, wheels, 1));
-    return merged(streams);
-  }
-};
-
-/// Largest horizontal error of the fused pose between two times.
-struct Watch {
-  const SimulatedDrive& drive;
-  double from_s, to_s;
-  double largest = 0.0;
-  double largest_sigma = 0.0;
-  bool said = false;  ///< the words appeared in the reason
-  std::string words{};
-  void operator()(const Fusion& f, const StreamEvent& e) {
-    const double t = seconds(drive, e.sample.odometry.t_us);
-    if (t < from_s || t > to_s) return;
-    const test::PlanarError p = planar_error(drive, f.fused());
-    largest = std::max(largest, p.distance());
-    largest_sigma = std::max(largest_sigma, std::sqrt(p.cov.topLeftCorner<2, 2>().trace()));
-    said = said || (!words.empty() && f.report().reason.find(words) != std::string::npos);
-  }
-};
-
-TEST_CASE("alone, the INS is what the fusion gives") {
-  Tunnel t;
-  const auto events = ins_stream(t.drive, t.ins, 1);
-  Fusion fusion({});
-  double largest = 0.0;
-  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
-    if (seconds(t.drive, e.sample.odometry.t_us) > 40.0) return;
-    const Planar d = planar_pose(f.fused()) - planar_pose(e.sample.odometry);
-    largest = std::max(largest, d.head<2>().norm());
-  });
-  CHECK(largest < 0.3);
-  CHECK(fusion.report().validity == Validity::kValid);
-}
+using test::Tunnel;
+using test::Watch;
 
 TEST_CASE("vision carries the pose through a tunnel, where the INS alone drifts") {
   const Tunnel t;

@@ -19,7 +19,7 @@ using test::Draws;
 using test::random_estimate;
 
 const ChannelSlots kVision{kVoClone, kVoScale, kVoDrift, std::nullopt};
-const ChannelSlots kInertial{kInsClone, std::nullopt, std::nullopt, kInsVelocity};
+const ChannelSlots kInertial{kInsClone, std::nullopt, kInsDrift, kInsVelocity};
 
 TEST_CASE("Jacobian of the relative motion, scale and drift included") {
   Draws draws(1);
@@ -63,6 +63,30 @@ TEST_CASE("a cloned pose is correlated as the pose is, and moves with it") {
                                                  Planar::Zero(), 0.1, 1e-4 * Eigen::Matrix3d::Identity());
   (void)kalman_update<3>(e, m.H, m.innovation, m.R);
   CHECK((e.P - before.P).norm() < 1e-9);
+}
+
+TEST_CASE("motion carried on is the update of a pose of which no model knows anything") {
+  Draws draws(6);
+  for (int i = 0; i < 20; ++i) {
+    FusionEstimate carried = random_estimate(draws);
+    FusionEstimate updated = carried;
+    const Planar motion = draws.vector<3>(0.5);
+    const Eigen::Matrix3d R = Eigen::Vector3d(1e-4, 4e-4, 1e-6).asDiagonal();
+    carry_on(carried, kInertial, motion, 0.3, R, true);
+    // Independent of all else and unknown; linearised where the update ends, for it is not linear in the yaw.
+    for (int k = 0; k < 3; ++k) set_independent(updated, kPos + k, carried.x(kPos + k), 1e4);
+    const FusionMeasurement<3> m = relative_motion(updated.x, kInertial, motion, 0.3, R);
+    CHECK(m.innovation.norm() < 1e-12);
+    (void)kalman_update<3>(updated, m.H, m.innovation, m.R);
+    CHECK((carried.x - updated.x).norm() < 1e-9);
+    CHECK((carried.P - updated.P).norm() < 1e-5 * carried.P.norm());
+    // What a model knows is used by the update and not by this.
+    FusionEstimate known = random_estimate(draws);
+    const FusionEstimate before = known;
+    carry_on(known, kInertial, motion, 0.3, R, true);
+    CHECK((known.x - before.x).segment<3>(kPos).norm() > 0.1);
+    CHECK((known.x - before.x).tail<kSize - 3>().norm() == 0.0);
+  }
 }
 
 TEST_CASE("the gained measurement takes the estimate to the pose and its covariance") {
