@@ -76,7 +76,9 @@ FuseStatus Fusion::add(const ChannelSample& s) {
     // Wheels and imu are in the INS already. Not even a step is split for them.
     memory(s.channel).last.reset();
     memory(s.channel).alive_us = report.last_us = s.odometry.t_us;
-    return done(FuseStatus::kDisabled);
+    report.status = FuseStatus::kDisabled;
+    weigh(s.channel, 0.0);
+    return report.status;
   }
   if (!started_ && !good) return done(FuseStatus::kBadQuality);
   if (!started_) start(s);
@@ -98,8 +100,9 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   remember(s, view);
   reweigh(imm_);
   now_ = combine(imm_);
+  report.status = status;
   weigh(s.channel, std::max(0.0, known / now_.P.block<2, 2>(kPos, kPos).trace() - 1.0));
-  return done(status);
+  return status;
 }
 
 FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Before& before,

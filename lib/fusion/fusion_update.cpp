@@ -353,6 +353,10 @@ void Fusion::remember(const ChannelSample& s, const LevelView& view) {
 void Fusion::weigh(FusionChannel c, double information) {
   const auto i = static_cast<std::size_t>(c);
   information_[i] += kWeightSmoothing * (information - information_[i]);
+  for (std::size_t k = 0; k < information_.size(); ++k) {  // who is silent, or is not asked, tells nothing
+    const bool used = reports_[k].status != FuseStatus::kDisabled && alive(static_cast<FusionChannel>(k));
+    if (!used) information_[k] = 0.0;
+  }
   double sum = 0.0;
   for (const double share : information_) sum += share;
   for (std::size_t k = 0; k < information_.size(); ++k) reports_[k].weight = sum > 0.0 ? information_[k] / sum : 0.0;

@@ -217,6 +217,29 @@ TEST_CASE("GNSS/INS killed and started again: vision and wheels carry on") {
   CHECK(wheels_used);
 }
 
+TEST_CASE("weights tell who is used now: nothing is said of a channel that is silent or disabled") {
+  Tunnel t;
+  auto events = t.events();
+  std::erase_if(events, [&](const StreamEvent& e) {  // wheels alone at first, vision from 10 s to 60 s
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    const FusionChannel c = e.sample.channel;
+    return (c == FusionChannel::kIns && s < 5.0) || (c == FusionChannel::kVo && (s < 10.0 || s > 60.0));
+  });
+  Fusion fusion({});
+  const auto weight = [&](FusionChannel c) { return fusion.channel(c).weight; };
+  double seen = 0.0;
+  run(fusion, events, [&](const Fusion&, const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    if (s > 1.0 && s < 4.9) CHECK(weight(FusionChannel::kWheel) == 1.0);
+    if (s < 5.5) return;
+    CHECK(weight(FusionChannel::kWheel) == 0.0);
+    CHECK(weight(FusionChannel::kIns) + weight(FusionChannel::kVo) == Approx(1.0));
+    if (s > 50.0 && s < 60.0) seen = std::max(seen, weight(FusionChannel::kVo));
+    if (s > 61.0) CHECK(weight(FusionChannel::kVo) == 0.0);
+  });
+  CHECK(seen > 0.1);
+}
+
 TEST_CASE("a return by more than the limit waits for three fixes, then jumps once, counted") {
   Tunnel t;
   t.ins.velocity_walk = 0.1;
