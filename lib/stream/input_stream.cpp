@@ -106,13 +106,22 @@ InputStream::Standing InputStream::standing(int input, const EventId& id) const 
 }
 
 /// What comes before a late message and is not here would be late as well: it is given up now, not only when a later
-/// one is applied.
+/// one is applied. What waits is here: its stamp may lie ahead of the late one's.
 void InputStream::settle_late(int input, const EventId& id) {
   InputTrack& track = track_of(input);
   if (!track.settled || track.settled->run != id.run) return;
-  if (id.seq > track.settled->seq + 1) note_lost(input, id.run, track.settled->seq + 1, id.seq - 1);
-  track.settled->seq = id.seq;
+  for (const int64_t seq : waiting_.seqs(input, id.run, id.seq)) {
+    if (seq > track.settled->seq) settle_seq(input, id.run, seq);
+  }
+  settle_seq(input, id.run, id.seq);
   track.newest_settled_utime = std::max(track.newest_settled_utime, id.utime);
+}
+
+/// What is missing between the last settled message of the run and this later one is lost.
+void InputStream::settle_seq(int input, int64_t run, int64_t seq) {
+  InputTrack& track = track_of(input);
+  if (seq > track.settled->seq + 1) note_lost(input, run, track.settled->seq + 1, seq - 1);
+  track.settled->seq = seq;
 }
 
 Offer InputStream::refuse(int input, const EventId& id, LedgerKind kind) {
@@ -158,8 +167,7 @@ void InputStream::settle(int input, const EventId& id) {
     ledger_.note(LedgerKind::kRunBegan, input, id.run, id.seq, id.seq, id.utime);
     track.begin_run(id.run, id.seq);
   } else if (id.run == track.settled->run && id.seq > track.settled->seq) {
-    if (id.seq > track.settled->seq + 1) note_lost(input, id.run, track.settled->seq + 1, id.seq - 1);
-    track.settled->seq = id.seq;
+    settle_seq(input, id.run, id.seq);
   }
   track.newest_settled_utime = std::max(track.newest_settled_utime, id.utime);
 }

@@ -104,6 +104,7 @@ class InputStream {
   bool admit(const WaitingInput& waiting);
   void settle(int input, const EventId& id);
   void settle_late(int input, const EventId& id);
+  void settle_seq(int input, int64_t run, int64_t seq);
   void note_lost(int input, int64_t run, int64_t first_seq, int64_t last_seq);
   void limit_waiting();
   InputTrack& track_of(int input) { return tracks_[static_cast<std::size_t>(input)]; }

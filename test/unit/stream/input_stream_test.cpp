@@ -102,6 +102,27 @@ TEST_CASE("a gap is a loss; what arrives after all is late, what came before is 
   REQUIRE(stream.track(kSlow).counters.duplicate == 3);
 }
 
+TEST_CASE("stamps that ran ahead and come back late: what waits is not lost, and is applied") {
+  InputStream stream = make_stream();
+  tick_until(stream, 100);
+  offer(stream, kSlow, 60, 1);
+  tick_until(stream, 120);
+  offer(stream, kSlow, 140, 2);  // it and the next wait for the horizon, now at 70
+  offer(stream, kSlow, 150, 3);
+  REQUIRE(offer(stream, kSlow, 65, 6) == Offer::kLate);  // the sensor's clock was put back; 4 and 5 never came
+  std::vector<Applied> applied;
+  tick_until(stream, 220, &applied);
+  std::vector<int64_t> slow;
+  for (const Applied& a : applied) {
+    if (a.input == kSlow) slow.push_back(a.seq);
+  }
+  REQUIRE(slow == std::vector<int64_t>{2, 3});
+  const std::vector<LedgerEntry> lost = entries(stream, LedgerKind::kLost);
+  REQUIRE(lost.size() == 1);
+  REQUIRE((lost[0].first_seq == 4 && lost[0].last_seq == 5));
+  REQUIRE(stream.track(kSlow).counters.lost == 2);
+}
+
 TEST_CASE("a gap in the clock is a loss at once, and its stragglers are late") {
   InputStream stream = make_stream();
   tick_until(stream, 50);
