@@ -1,6 +1,7 @@
 #include "bus/ledger_record.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace roadfix {
 
@@ -51,8 +52,9 @@ bool LedgerRecord::accepts(int input, const EventId& id) const {
   return !excludes(input, id) && !unsettled_at_end(input, id);
 }
 
-void LedgerRecord::end_with(int64_t last_utime, const provenance_t& provenance) {
+void LedgerRecord::end_with(int64_t last_utime, const provenance_t& provenance, std::vector<int64_t> applied_utime) {
   last_utime_ = last_utime;
+  applied_utime_ = std::move(applied_utime);
   last_seq_ = provenance.last_seq;
   lateness_us_ = 0;
   for (const InputSpec& input : spec_.inputs) lateness_us_ = std::max(lateness_us_, input.lateness_us);
@@ -62,9 +64,12 @@ bool LedgerRecord::unsettled_at_end(int input, const EventId& id) const {
   constexpr int64_t kEnd_us = 10'000'000;
   const auto i = static_cast<std::size_t>(input);
   if (last_utime_ == 0 || i >= last_seq_.size() || id.seq <= last_seq_[i]) return false;
+  const std::optional<int64_t> newest = newest_run(input);
+  if (newest && id.run < *newest) return false;  // the last seq is a later run's
   const int64_t effect_utime = id.utime + spec_.inputs[i].effect_delay_us;
   const bool recent = id.utime > last_utime_ - kEnd_us || last_seq_[i] < 0;
-  return recent && effect_utime <= last_utime_ - lateness_us_;
+  const bool went_back = i < applied_utime_.size() && id.utime < applied_utime_[i] - kEnd_us;
+  return (recent || went_back) && effect_utime <= last_utime_ - lateness_us_;
 }
 
 bool LedgerRecord::excludes(int input, const EventId& id) const {
@@ -78,6 +83,12 @@ bool LedgerRecord::excludes(int input, const EventId& id) const {
 std::optional<int64_t> LedgerRecord::began_at(int input, int64_t run) const {
   const auto found = began_.find({input, run});
   return found == began_.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::optional<int64_t> LedgerRecord::newest_run(int input) const {
+  const auto after = began_.lower_bound({input + 1, std::numeric_limits<int64_t>::min()});
+  if (after == began_.begin() || std::prev(after)->first.first != input) return std::nullopt;
+  return std::prev(after)->first.second;
 }
 
 bool LedgerRecord::changes_clock(int input, const EventId& id) const {

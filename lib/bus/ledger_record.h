@@ -25,8 +25,10 @@ class LedgerRecord : public Precedent {
 
   /// The run ended with this output: what its ledger had no time to tell. Inputs of the last 10 s that the horizon had
   /// passed, but that lie behind the last ones applied, were not there in time; nor were older ones of a channel of
-  /// which none was ever applied.
-  void end_with(int64_t last_utime, const provenance_t& provenance);
+  /// which none was ever applied; nor what has later numbers and much older stamps than the last ones applied: the
+  /// stamps went back, and another run of the stage took it. `applied_utime`: per input, of the last one applied, as
+  /// far as the log has it.
+  void end_with(int64_t last_utime, const provenance_t& provenance, std::vector<int64_t> applied_utime);
 
   [[nodiscard]] bool accepts(int input, const EventId& id) const override;
   [[nodiscard]] bool changes_clock(int input, const EventId& id) const override;
@@ -37,6 +39,8 @@ class LedgerRecord : public Precedent {
   [[nodiscard]] bool excludes(int input, const EventId& id) const;
   /// First seq that the stage took of this run, where its beginning is recorded.
   [[nodiscard]] std::optional<int64_t> began_at(int input, int64_t run) const;
+  /// Of those whose beginning is recorded.
+  [[nodiscard]] std::optional<int64_t> newest_run(int input) const;
   /// Numbers above `known` that the log does not have, as first and last.
   [[nodiscard]] std::vector<std::pair<int64_t, int64_t>> missing_after(int64_t known) const;
   /// Whether the message falls under end_with().
@@ -64,6 +68,7 @@ class LedgerRecord : public Precedent {
   int64_t base_ = 0;
   int64_t last_utime_ = 0;  // 0: the end is not known
   std::vector<int64_t> last_seq_;
+  std::vector<int64_t> applied_utime_;
   int64_t lateness_us_ = 0;
 };
 

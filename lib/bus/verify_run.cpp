@@ -13,6 +13,7 @@ namespace {
 
 constexpr int64_t kEver = std::numeric_limits<int64_t>::max();
 constexpr int64_t kNever = std::numeric_limits<int64_t>::min();
+constexpr int64_t kMargin_us = 1'000'000'000;  // so that kNever may be subtracted from
 
 class RunVerifier : public MessageSink {
  public:
@@ -67,7 +68,13 @@ void RunVerifier::end_ledger() {
   const std::string& type = spec_.outputs[static_cast<std::size_t>(last.output)].type;
   const std::optional<provenance_t> provenance = read_provenance(type, last.bytes);
   if (!provenance) return;
-  run_.ledger.end_with(last.header.utime, *provenance);
+  std::vector<int64_t> applied_utime(provenance->last_seq.size(), kNever + kMargin_us);
+  for (const LoggedInput& logged : log_.inputs) {
+    const auto i = static_cast<std::size_t>(logged.input);
+    const bool applied = i < applied_utime.size() && logged.id.seq == provenance->last_seq[i];
+    if (applied && logged.id.run == run_.ledger.newest_run(logged.input)) applied_utime[i] = logged.id.utime;
+  }
+  run_.ledger.end_with(last.header.utime, *provenance, std::move(applied_utime));
   std::map<int, std::pair<int64_t, int64_t>> unsettled;
   for (const LoggedInput& logged : log_.inputs) {
     if (!run_.ledger.unsettled_at_end(logged.input, logged.id) || run_.ledger.excludes(logged.input, logged.id))
