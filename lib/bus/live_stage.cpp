@@ -8,6 +8,10 @@ namespace roadfix {
 namespace {
 constexpr int64_t kHeartbeat_us = 1'000'000;
 constexpr int64_t kConfig_us = 10'000'000;
+/// A change of state is told soon after it happened, not with the next heartbeat.
+constexpr int64_t kLook_us = 100'000;
+/// What a message caused (two publishers, an overload) is told for this long.
+constexpr int64_t kTrouble_us = 700'000;
 /// Without a tick for this long a stage says so; shorter gaps are ordinary.
 constexpr int64_t kNoClock_us = 1'000'000;
 /// So many clock samples in a row, all that much older than the clock: the stamps have gone back (a log played again, a
@@ -124,7 +128,13 @@ void LiveStage::publish_due() {
     remember();
     next_config_us_ = now + kConfig_us;
   }
+  if (now >= next_look_us_) {
+    next_look_us_ = now + kLook_us;
+    note_trouble(now);
+    if (state(now).first != told_state_) next_heartbeat_us_ = now;
+  }
   if (now >= next_heartbeat_us_) {
+    note_trouble(now);
     publish_heartbeat(now, false);
     next_heartbeat_us_ = now + kHeartbeat_us;
   }
@@ -132,11 +142,30 @@ void LiveStage::publish_due() {
 
 void LiveStage::stop() {
   remember();
+  note_trouble(clock_.now_utime());
   publish_heartbeat(clock_.now_utime(), true);
 }
 
 void LiveStage::put(const std::string& channel, const Header&, std::span<const uint8_t> bytes) {
   bus_.publish(channel, bytes);
+}
+
+/// What the counters say beside the last look: what happened once and is over is no trouble any more.
+void LiveStage::note_trouble(int64_t now_utime) {
+  const std::vector<InputSpec>& inputs = runner_->spec().inputs;
+  counted_.resize(inputs.size());
+  for (std::size_t i = inputs.size(); i-- > 0;) {  // of several the first one's is told
+    const InputCounters& counters = runner_->stream().track(static_cast<int>(i)).counters;
+    if (counters.skipped > counted_[i].skipped) {
+      trouble_ = inputs[i].channel + ": too fast for this stage, " + std::to_string(counters.skipped) + " skipped";
+      trouble_until_us_ = now_utime + kTrouble_us;
+    }
+    if (counters.conflicts > counted_[i].conflicts) {
+      trouble_ = inputs[i].channel + ": two publishers, or a log played again with old names";
+      trouble_until_us_ = now_utime + kTrouble_us;
+    }
+    counted_[i] = counters;
+  }
 }
 
 std::pair<int8_t, std::string> LiveStage::state(int64_t now_utime) const {
@@ -149,18 +178,7 @@ std::pair<int8_t, std::string> LiveStage::state(int64_t now_utime) const {
     return {heartbeat_t::STATE_NO_CLOCK, "no newer sample on " + clocks};
   }
   if (!stream.clock_utime()) return {heartbeat_t::STATE_STARTING, "waits for its clock"};
-  for (std::size_t i = 0; i < runner_->spec().inputs.size(); ++i) {
-    if (stream.track(static_cast<int>(i)).counters.conflicts > 0) {
-      return {heartbeat_t::STATE_DEGRADED,
-              runner_->spec().inputs[i].channel + ": two publishers, or a log played again with old names"};
-    }
-  }
-  for (std::size_t i = 0; i < runner_->spec().inputs.size(); ++i) {
-    if (const int64_t skipped = stream.track(static_cast<int>(i)).counters.skipped; skipped > 0) {
-      return {heartbeat_t::STATE_DEGRADED,
-              runner_->spec().inputs[i].channel + ": too fast for this stage, " + std::to_string(skipped) + " skipped"};
-    }
-  }
+  if (now_utime < trouble_until_us_) return {heartbeat_t::STATE_DEGRADED, trouble_};
   if (!memory_trouble_.empty()) return {heartbeat_t::STATE_DEGRADED, memory_trouble_};
   return {heartbeat_t::STATE_RUNNING, began_because_};
 }
@@ -171,6 +189,7 @@ void LiveStage::publish_heartbeat(int64_t now_utime, bool stopping) {
   heartbeat.run = clock_.run();
   heartbeat.seq = heartbeat_seq_++;
   std::tie(heartbeat.state, heartbeat.state_reason) = state(now_utime);
+  told_state_ = heartbeat.state;
   if (stopping) heartbeat.state = heartbeat_t::STATE_STOPPING;
   heartbeat.cpu_share = load_.cpu_share();
   heartbeat.rss_bytes = resident_bytes();

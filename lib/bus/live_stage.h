@@ -1,4 +1,4 @@
-/// A stage on a bus: subscribes to its inputs, publishes its outputs, and once a second says how it is.
+/// A stage on a bus: subscribes to its inputs, publishes its outputs, and says how it is once a second and on change.
 ///
 /// The wall clock is read for heartbeats and configuration messages only; what the stage computes is the runner's, and
 /// so the same as in replay. What it decides by arrival (which frames to skip under overload, when to begin again) the
@@ -49,6 +49,7 @@ class LiveStage : public MessageSink {
   void publish_heartbeat(int64_t now_utime, bool stopping);
   void fill_inputs(heartbeat_t& heartbeat);
   void publish_config(int64_t now_utime);
+  void note_trouble(int64_t now_utime);
   std::pair<int8_t, std::string> state(int64_t now_utime) const;
 
   Bus& bus_;
@@ -64,7 +65,12 @@ class LiveStage : public MessageSink {
   std::optional<state_t> memory_;  ///< until the first clock sample
   std::string memory_trouble_;
   int64_t started_us_ = 0;
-  int64_t last_tick_us_ = 0;  ///< of the run clock, when the newest tick came
+  int64_t last_tick_us_ = 0;            ///< of the run clock, when the newest tick came
+  std::vector<InputCounters> counted_;  ///< at the last look
+  std::string trouble_;
+  int64_t trouble_until_us_ = 0;
+  int8_t told_state_ = -1;
+  int64_t next_look_us_ = 0;
   int64_t next_heartbeat_us_ = 0;
   int64_t next_config_us_ = 0;
   int64_t heartbeat_seq_ = 0;

@@ -1,5 +1,7 @@
 // What a live stage decides by arrival, and what happens to it on the way: its recording verifies.
 #include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
 
 #include "bus/live_stage.h"
 #include "bus/memory_bus.h"
@@ -170,6 +172,10 @@ TEST_CASE("a log played again with shifted stamps and its old names is refused a
   recorder.play_all(shifted(drive, 20'000'000, 0));
   recorder.stop();
   REQUIRE_THAT(recorder.last_heartbeat().state_reason, Catch::Contains("IMU: two publishers, or a log played again"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // what is over is told no more, and that at once
+  recorder.step();
+  recorder.stop();
+  REQUIRE(recorder.last_heartbeat().state_reason.find("two publishers") == std::string::npos);
   const StageVerdict verdict = recorder.verdict();
   REQUIRE(verdict.runs.size() == 1);
   require_all_identical(verdict, 2000);
@@ -185,6 +191,34 @@ TEST_CASE("drivers started anew, the clock's among them: one run of the stage go
   const StageVerdict verdict = recorder.verdict();
   REQUIRE(verdict.runs.size() == 1);
   require_all_identical(verdict, 4000);
+}
+
+TEST_CASE("a stage that dies soon after a driver was started anew: the older run's numbers are not the newer's") {
+  Recorder recorder(maker(filter_spec()));
+  std::vector<DriveMessage> drive = small_drive(20.0);
+  const std::vector<DriveMessage> again = shifted(small_drive(5.0), 15'000'000, 15'000'000);
+  std::erase_if(drive, [](const DriveMessage& m) { return m.channel == "WHEELS" && m.header.seq >= 750; });
+  for (const DriveMessage& m : again) {
+    if (m.channel == "WHEELS") drive.push_back(m);
+  }
+  std::stable_sort(drive.begin(), drive.end(),
+                   [](const DriveMessage& a, const DriveMessage& b) { return a.header.utime < b.header.utime; });
+  recorder.play_all(drive);
+  require_all_identical(recorder.verdict(), 1999);  // not stopped: the ledger ends where it was killed
+}
+
+TEST_CASE("a clock put back within a driver's run: each run of the stage has its own part of it") {
+  Recorder recorder(maker(filter_spec()));
+  const std::vector<DriveMessage> drive = small_drive(30.0);
+  const std::vector<DriveMessage> ahead = shifted(drive, 60'000'000, 0);
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    const double t_s = static_cast<double>(drive[i].header.utime - kDriveStart_us) * 1e-6;
+    recorder.play(t_s > 10.0 && t_s < 20.0 ? ahead[i] : drive[i]);
+    recorder.step();
+  }
+  const StageVerdict verdict = recorder.verdict();
+  REQUIRE(verdict.runs.size() == 2);
+  require_all_identical(verdict, 2900);
 }
 
 TEST_CASE("two publishers on a channel, also on the clock: said, and what was computed verifies") {
