@@ -11,7 +11,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr int64_t kWindow_us = 2'000'000;
+constexpr int64_t kWindow_us = 1'000'000;
 constexpr std::size_t kWindowMessages = 256;
 /// Slow channels are described by their last few messages, up to this age.
 constexpr std::size_t kLeastMessages = 6;
@@ -19,6 +19,7 @@ constexpr int64_t kOldest_us = 12'000'000;
 /// Share of the intervals that must lie near their median before a channel counts as regular.
 constexpr double kRegularShare = 0.7;
 constexpr double kNear = 0.5;
+constexpr double kScatter = 3.0;  // standard deviations of the arrival that a slow channel may be overdue
 /// A rate this much above the expected one is the new expectation.
 constexpr double kFaster = 1.2;
 constexpr std::array<std::string_view, 9> kEventPrefixes = {"LEDGER_", "CONFIG_", "STATE_",     "START_", "HEARTBEAT_",
@@ -134,8 +135,24 @@ double ChannelWatch::rate_hz(int64_t now_us) const {
 
 bool ChannelWatch::silent(int64_t now_us) const {
   if (!judged_ || !expected_hz_ || window_.empty()) return false;
-  const double limit = std::max(limits_.silent_periods / *expected_hz_, limits_.silent_at_least);
-  return seconds(now_us - window_.back().now_us) > limit;
+  return seconds(now_us - window_.back().now_us) > silent_after();
+}
+
+/// A fast channel may miss a message or two; a slow one is missed soon after it was due.
+double ChannelWatch::silent_after() const {
+  const double period = 1.0 / *expected_hz_;
+  const double due = period + std::max(limits_.silent_at_least, kScatter * jitter_s());
+  return std::max(std::min(limits_.silent_periods * period, due), limits_.silent_at_least);
+}
+
+double ChannelWatch::jitter_s() const {
+  if (window_.size() < 3) return 0.0;
+  const double mean = seconds(window_.back().now_us - window_.front().now_us) / static_cast<double>(window_.size() - 1);
+  double sum = 0.0;
+  for (std::size_t i = 1; i < window_.size(); ++i) {
+    sum += std::pow(seconds(window_[i].now_us - window_[i - 1].now_us) - mean, 2);
+  }
+  return std::sqrt(sum / static_cast<double>(window_.size() - 1));
 }
 
 Condition ChannelWatch::condition(const std::string& what, Verdict verdict, const std::string& text) const {
@@ -221,13 +238,7 @@ ChannelReport ChannelWatch::report(int64_t now_us, int64_t lag_us) const {
   report.rate_hz = rate_hz(now_us);
   report.age_s = seconds(now_us - window_.back().now_us);
   if (const std::optional<int64_t> lag = this->lag_us()) report.latency_s = seconds(*lag - lag_us);
-  if (window_.size() < 3) return report;
-  const double mean = seconds(window_.back().now_us - window_.front().now_us) / static_cast<double>(window_.size() - 1);
-  double sum = 0.0;
-  for (std::size_t i = 1; i < window_.size(); ++i) {
-    sum += std::pow(seconds(window_[i].now_us - window_[i - 1].now_us) - mean, 2);
-  }
-  report.jitter_s = std::sqrt(sum / static_cast<double>(window_.size() - 1));
+  report.jitter_s = jitter_s();
   return report;
 }
 

@@ -67,6 +67,8 @@ class ChannelWatch {
   void learn(int64_t now_us);
   [[nodiscard]] double rate_hz(int64_t now_us) const;
   [[nodiscard]] bool silent(int64_t now_us) const;
+  [[nodiscard]] double silent_after() const;
+  [[nodiscard]] double jitter_s() const;
   [[nodiscard]] Condition condition(const std::string& what, Verdict verdict, const std::string& text) const;
   void judge_rate(int64_t now_us, std::vector<Condition>& out) const;
   void judge_stamps(int64_t now_us, int64_t lag_us, std::vector<Condition>& out) const;

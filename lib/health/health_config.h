@@ -10,12 +10,12 @@ namespace roadfix {
 /// A verdict within a second of the fault, recovery within two of its end: every window below is short for that.
 struct AlarmConfig {
   double raise_after = 0.1;  ///< s that a condition must hold before it counts
-  double clear_after = 0.7;  ///< s that it must be gone before it is forgotten
+  double clear_after = 0.5;  ///< s that it must be gone before it is forgotten
 };
 
 struct ChannelLimits {
   double learn = 3.0;            ///< s of listening before a rate counts as known
-  double silent_periods = 2.5;   ///< of the expected rate
+  double silent_periods = 2.5;   ///< of the expected rate; a slow channel: silent_at_least after it was due
   double silent_at_least = 0.3;  ///< s; a shorter gap is no silence, however fast the channel
   double slow_share = 0.7;       ///< of the expected rate
   double lost_share = 0.05;      ///< of the messages of one second
@@ -45,7 +45,7 @@ struct ConsistencyLimits {
 };
 
 struct ProcessLimits {
-  double heartbeat = 2.5;  ///< s without a sign of life
+  double heartbeat = 2.5;  ///< s without a sign of life; 2.5 of its intervals where a process beats faster
   double cpu_share = 0.9;  ///< of one core
   double memory_mib = 4096.0;
   double queue_age = 0.5;   ///< s that an input may wait for its handler

@@ -15,6 +15,8 @@ constexpr std::size_t kMost = 1000;
 /// Degrees of freedom below which a mean says too little: at 10 a ratio of 5 is a chance of 1e-7.
 constexpr int kLeastDof = 10;
 constexpr int kLeastRefused = 3;
+/// Refused one and all for this long: told before they are most of the window.
+constexpr int64_t kInARow_us = 400'000;
 
 }  // namespace
 
@@ -53,6 +55,17 @@ NisReport NisWatch::report(int64_t now_us) const {
   return report;
 }
 
+bool NisWatch::refused_in_a_row(int64_t now_us) const {
+  if (attempts_.empty() || now_us - attempts_.back().now_us > std::llround(limits_.window * 1e6)) return false;
+  int count = 0;
+  int64_t since_us = 0;
+  for (auto attempt = attempts_.rbegin(); attempt != attempts_.rend() && !attempt->accepted; ++attempt) {
+    ++count;
+    since_us = attempt->now_us;
+  }
+  return count >= kLeastRefused && attempts_.back().now_us - since_us >= kInARow_us;
+}
+
 void NisWatch::judge(int64_t now_us, std::vector<Condition>& out) const {
   const NisReport r = report(now_us);
   int dof = 0;
@@ -62,7 +75,8 @@ void NisWatch::judge(int64_t now_us, std::vector<Condition>& out) const {
                    fmt::format("{} fits worse than it claims: squared errors are {:.1f} times what they should be",
                                source_, r.ratio)});
   }
-  if (r.refused >= kLeastRefused && r.refused > limits_.refused_share * (r.used + r.refused)) {
+  const bool most = r.refused >= kLeastRefused && r.refused > limits_.refused_share * (r.used + r.refused);
+  if (most || refused_in_a_row(now_us)) {
     out.push_back({"refused." + source_, Verdict::kDegraded, kRankConsistency,
                    fmt::format("{} is refused: {} of the last {} contradict the estimate", source_, r.refused,
                                r.used + r.refused)});

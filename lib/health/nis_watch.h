@@ -35,6 +35,7 @@ class NisWatch {
     int dof = 0;
     bool accepted = false;
   };
+  [[nodiscard]] bool refused_in_a_row(int64_t now_us) const;
   [[nodiscard]] std::vector<Attempt> window(int64_t now_us) const;
 
   std::string source_;

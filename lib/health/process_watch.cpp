@@ -2,11 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace roadfix {
 
 namespace {
 
 constexpr double kMebi = 1024.0 * 1024.0;
+constexpr std::size_t kIntervals = 5;
+constexpr double kBeats = 2.5;    // intervals without a sign of life
+constexpr double kAtLeast = 0.5;  // s, however fast it beats
 
 double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
 
@@ -15,14 +20,27 @@ double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
 void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
   if (newest_ && newest_->run != facts.run) {
     ++restarts_;
+    restarted_.add(now_us);
+    intervals_us_.clear();
   } else if (newest_ && facts.kernel_drops > newest_->kernel_drops) {
     drops_.add(now_us, facts.kernel_drops - newest_->kernel_drops);
+  }
+  if (newest_ && newest_->run == facts.run) {
+    intervals_us_.push_back(now_us - now_us_);
+    if (intervals_us_.size() > kIntervals) intervals_us_.pop_front();
   }
   newest_ = facts;
   now_us_ = now_us;
 }
 
-bool ProcessWatch::silent(int64_t now_us) const { return newest_ && seconds(now_us - now_us_) > limits_.heartbeat; }
+/// A process that beats fast is missed soon: by the longest of its last intervals, so that an early one says nothing.
+double ProcessWatch::silent_after() const {
+  if (intervals_us_.size() < kIntervals) return limits_.heartbeat;
+  const double longest = seconds(*std::max_element(intervals_us_.begin(), intervals_us_.end()));
+  return std::clamp(kBeats * longest, std::min(kAtLeast, limits_.heartbeat), limits_.heartbeat);
+}
+
+bool ProcessWatch::silent(int64_t now_us) const { return newest_ && seconds(now_us - now_us_) > silent_after(); }
 
 Condition ProcessWatch::condition(const std::string& what, const std::string& text) const {
   return {"process." + name_ + "." + what, Verdict::kDegraded, kRankProcess, name_ + " " + text};
@@ -42,6 +60,7 @@ void ProcessWatch::judge(int64_t now_us, int64_t start_us, std::vector<Condition
         condition("silent", fmt::format("has shown no sign of life for {:.0f} s", seconds(now_us - now_us_))));
     return;
   }
+  if (restarted_.within(now_us) > 0) out.push_back(condition("restarted", "was started anew"));
   if (newest_->state == ProcessState::kNoClock)
     out.push_back(condition("no_clock", "stands still: " + newest_->reason));
   if (newest_->state == ProcessState::kDegraded) out.push_back(condition("degraded", "says: " + newest_->reason));

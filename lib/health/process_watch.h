@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,6 +45,7 @@ class ProcessWatch {
 
  private:
   [[nodiscard]] bool silent(int64_t now_us) const;
+  [[nodiscard]] double silent_after() const;
   [[nodiscard]] Condition condition(const std::string& what, const std::string& text) const;
   void judge_load(int64_t now_us, std::vector<Condition>& out) const;
 
@@ -51,8 +53,9 @@ class ProcessWatch {
   ProcessLimits limits_;
   std::optional<HeartbeatFacts> newest_;
   int64_t now_us_ = 0;
+  std::deque<int64_t> intervals_us_;  ///< between the last few heartbeats
   int restarts_ = 0;
-  Recent drops_;
+  Recent drops_, restarted_;
 };
 
 }  // namespace roadfix

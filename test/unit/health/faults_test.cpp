@@ -1,5 +1,6 @@
 // Each fault is told within a second and forgotten within two of its end; the same drive without it says "ok".
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "small_car.h"
 
@@ -169,7 +170,63 @@ TEST_CASE("a dead process is told by its silence, a stopped one by its word") {
   car.drive(0.0, kFault);
   const double told = car.told("process.imm_fusion.silent", kFault, kMended);
   CHECK(told > kFault);
-  CHECK(told < kFault + 2.0);  // its last heartbeat was at 9 s
+  CHECK(told < kFault + 2.0);  // it beats once a second, the last time at 9 s
+}
+
+TEST_CASE("a process that beats fast is missed soon, a slow one later; a restart is told") {
+  for (const int64_t period_us : {250'000, 1'000'000}) {
+    ProcessWatch watch("recorder", ProcessLimits{});
+    const auto told = [&](int64_t now_us) {
+      std::vector<Condition> conditions;
+      watch.judge(now_us, 0, conditions);
+      return conditions.empty() ? "" : conditions.front().key;
+    };
+    HeartbeatFacts beat;
+    beat.run = 1;
+    beat.state = ProcessState::kRunning;
+    int64_t last_us = 0;
+    for (int i = 0; i < 20; ++i) watch.heartbeat(last_us = test::at(0.0) + i * period_us, beat);
+    CHECK(told(last_us + 5 * period_us / 2 - 1) == "");
+    CHECK(told(last_us + 5 * period_us / 2 + 1) == "process.recorder.silent");
+    beat.run = 2;
+    watch.heartbeat(last_us += 3 * period_us, beat);
+    CHECK(told(last_us + 100'000) == "process.recorder.restarted");
+    CHECK(told(last_us + 1'100'000) == "");
+  }
+}
+
+TEST_CASE("a slow sensor is missed soon after it was due, unless it comes irregularly") {
+  for (const int64_t scatter_us : {0, 200'000}) {
+    ChannelWatch watch("GNSS", ChannelLimits{}, 1.0);
+    const auto silent = [&](int64_t now_us) {
+      std::vector<Condition> conditions;
+      watch.judge(now_us, 0, 0, Verdict::kDegraded, conditions);
+      return !conditions.empty() && conditions.front().key == "channel.GNSS.silent";
+    };
+    int64_t now_us = 0;
+    for (int i = 0; i < 20; ++i) {
+      now_us = test::at(i) + (i % 2) * scatter_us;
+      watch.arrived({now_us, test::at(i), 1, i, 100, std::nullopt});
+    }
+    CHECK_FALSE(silent(now_us + 1'250'000));
+    CHECK(silent(now_us + 1'350'000) == (scatter_us == 0));
+    CHECK(silent(now_us + 1'700'000));
+  }
+}
+
+TEST_CASE("measurements refused one and all are told before they are most of the window") {
+  SmallCar car;
+  car.tick = [&](double t) {
+    if (std::lround(t * 100) % 20 == 0) car.health.measurement("GNSS position in INS", test::at(t), 1.0, 3, !faulty(t));
+  };
+  check_told(car, "refused.GNSS position in INS", Verdict::kDegraded);
+  SmallCar single;
+  single.tick = [&](double t) {
+    if (std::lround(t * 100) % 20 == 0) {
+      single.health.measurement("GNSS position in INS", test::at(t), 1.0, 3, t < kFault || t > kFault + 0.35);
+    }
+  };
+  CHECK(single.told("refused.GNSS position in INS", 0.0, kMended) < 0.0);  // two in a row are none yet
 }
 
 TEST_CASE("what is expected and never comes is named; unexpected absence is not") {
