@@ -6,6 +6,8 @@
 #include <atomic>
 #include <ctime>
 #include <iostream>
+#include <mutex>
+#include <optional>
 #include <roadfix/heartbeat_t.hpp>
 #include <thread>
 
@@ -23,7 +25,9 @@ namespace roadfix {
 namespace {
 
 constexpr auto kPatience = std::chrono::milliseconds(50);
-constexpr int64_t kHeartbeat_us = 1'000'000;
+/// Four times as often as a stage: it has no output whose silence would tell that it died.
+constexpr int64_t kHeartbeat_us = 250'000;
+constexpr int64_t kTryAgain_us = 500'000;
 constexpr int kUserError = 2;
 /// The recording ended before it was told to: disk full, quota used up.
 constexpr int kStoppedEarly = 3;
@@ -57,9 +61,13 @@ class RecordingThread {
     if (thread_.joinable()) thread_.join();
   }
 
-  [[nodiscard]] bool stopped() const { return stopped_; }
+  /// Why nothing is recorded; absent while it is.
+  [[nodiscard]] std::optional<std::string> stopped() const {
+    const std::lock_guard lock(mutex_);
+    return stopped_;
+  }
   [[nodiscard]] const MessageQueue& queue() const { return queue_; }
-  /// Only after stopped() or finish().
+  /// Only after finish().
   [[nodiscard]] const Recording& recording() const { return recording_; }
 
  private:
@@ -71,20 +79,32 @@ class RecordingThread {
                  queue_.pop(last_round ? std::chrono::milliseconds(0) : kPatience)) {
         recording_.write(message->channel, message->received_us, message->data);
         recording_.flush(clock.now_utime());
-        stopped_ = recording_.state() == Recording::State::kStopped;
+        look(clock.now_utime());
       }
       recording_.flush(clock.now_utime());
-      stopped_ = recording_.state() == Recording::State::kStopped;
+      look(clock.now_utime());
       if (last_round) break;
     }
     recording_.note_dropped(queue_.dropped());
     recording_.close();
   }
 
+  void look(int64_t now_us) {
+    bool stopped = recording_.state() == Recording::State::kStopped;
+    if (stopped && now_us - tried_us_ > kTryAgain_us) {
+      tried_us_ = now_us;
+      stopped = !recording_.try_again();
+    }
+    const std::lock_guard lock(mutex_);
+    if (stopped != stopped_.has_value()) stopped_ = stopped ? std::optional(recording_.reason()) : std::nullopt;
+  }
+
   MessageQueue queue_;
   Recording recording_;
+  int64_t tried_us_ = 0;
+  mutable std::mutex mutex_;
+  std::optional<std::string> stopped_;
   std::atomic<bool> done_ = false;
-  std::atomic<bool> stopped_ = false;
   std::thread thread_;
 };
 
@@ -103,9 +123,9 @@ void publish_heartbeat(NetworkBus& bus, RunClock& clock, ProcessLoad& load, cons
     heartbeat.state_reason = fmt::format("{} messages did not fit into memory, the kernel dropped {} datagrams",
                                          dropped, bus.kernel_drops());
   }
-  if (recording.stopped()) {
+  if (const std::optional<std::string> reason = recording.stopped()) {
     heartbeat.state = heartbeat_t::STATE_DEGRADED;
-    heartbeat.state_reason = "not recording: " + recording.recording().reason();
+    heartbeat.state_reason = "not recording: " + *reason;
   }
   heartbeat.cpu_share = load.cpu_share();
   heartbeat.rss_bytes = resident_bytes();
@@ -137,22 +157,25 @@ int record(const Options& options) {
   ServiceNotifier service;
   service.ready("recording to " + config.folder);
   int64_t next_heartbeat_us = 0;
-  bool said = false;
+  bool stopped = false;
   for (int64_t seq = 0; !stop_requested();) {
     bus.handle(kPatience);
     service.alive();
-    if (recording.stopped() && !said) {
-      said = true;
-      std::cerr << "recorder: stopped: " << recording.recording().reason() << std::endl;
-    }
-    if (clock.now_utime() < next_heartbeat_us) continue;
+    const std::optional<std::string> reason = recording.stopped();
+    const bool changed = reason.has_value() != stopped;
+    stopped = reason.has_value();
+    if (changed) std::cerr << "recorder: " << (stopped ? "stopped: " + *reason : "records again") << std::endl;
+    if (!changed && clock.now_utime() < next_heartbeat_us) continue;
     next_heartbeat_us = clock.now_utime() + kHeartbeat_us;
     publish_heartbeat(bus, clock, load, recording, seq++);
   }
   service.stopping();
-  const bool early = recording.stopped();
+  const bool early = recording.stopped().has_value();
   recording.finish();
   std::cout << "recorded " << recording.recording().files().size() << " files" << std::endl;
+  if (const int64_t unwritten = recording.recording().unwritten(); unwritten > 0) {
+    std::cerr << "recorder: " << unwritten << " messages did not reach the disk" << std::endl;
+  }
   return early ? kStoppedEarly : 0;
 }
 

@@ -13,6 +13,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kMicrosecond = 1e-6;
+/// What must be free beyond the least before a stopped recording goes on: some seconds of a drive.
+constexpr double kRoom = 8.0 * kMebi;
 
 }  // namespace
 
@@ -128,26 +130,42 @@ bool Recording::delete_oldest() {
   return oldest != logs.end() && fs::remove(*oldest, error);
 }
 
+std::string Recording::lack_of_space() const {
+  const double left = static_cast<double>(free_(folder_)) / kGibi;
+  if (left < config_.min_free)
+    return fmt::format("{:.2f} GiB left on the disk of {}, min_free_gib is {}", left, folder_.string(),
+                       config_.min_free);
+  if (config_.quota <= 0.0) return "";
+  const double used = static_cast<double>(recorded_bytes()) / kGibi;
+  return used > config_.quota
+             ? fmt::format("{:.2f} GiB recorded in {}, quota_gib is {}", used, folder_.string(), config_.quota)
+             : "";
+}
+
 void Recording::check_space() {
-  const auto full = [&]() -> std::string {
-    const double left = static_cast<double>(free_(folder_)) / kGibi;
-    if (left < config_.min_free)
-      return fmt::format("{:.2f} GiB left on the disk of {}, min_free_gib is {}", left, folder_.string(),
-                         config_.min_free);
-    if (config_.quota <= 0.0) return "";
-    const double used = static_cast<double>(recorded_bytes()) / kGibi;
-    return used > config_.quota
-               ? fmt::format("{:.2f} GiB recorded in {}, quota_gib is {}", used, folder_.string(), config_.quota)
-               : "";
-  };
-  std::string why = full();
-  while (!why.empty() && config_.when_full == WhenFull::kDeleteOldest && delete_oldest()) why = full();
+  std::string why = lack_of_space();
+  while (!why.empty() && config_.when_full == WhenFull::kDeleteOldest && delete_oldest()) why = lack_of_space();
   if (!why.empty()) stop(why);
+}
+
+bool Recording::try_again() {
+  if (state_ == State::kRecording) return true;
+  if (static_cast<double>(free_(folder_)) < config_.min_free * kGibi + kRoom || !lack_of_space().empty()) return false;
+  try {
+    open_next();
+  } catch (const LogError&) {
+    return false;  // the reason for which it stopped stands
+  }
+  state_ = State::kRecording;
+  earlier_reason_ = reason_;
+  reason_.clear();
+  return true;
 }
 
 void Recording::write_sidecar() const {
   Sidecar sidecar;
   sidecar.stopped_because = reason_;
+  if (reason_.empty() && !earlier_reason_.empty()) sidecar.stopped_because = "for a while: " + earlier_reason_;
   sidecar.dropped = dropped_;
   sidecar.unwritten = unwritten_;
   for (const FileFacts& f : facts_) sidecar.files.push_back({f.name, f.first_us, f.last_us, f.bytes, f.hash, f.events});

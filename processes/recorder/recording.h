@@ -37,6 +37,9 @@ class Recording {
   /// What was written is on the disk; splits and stops as the configuration says.
   void flush(int64_t now_us);
 
+  /// Once stopped: goes on in a new file where the disk has room again. Whether it records.
+  bool try_again();
+
   /// Closes the current file and begins the next; no message is lost.
   void split();
 
@@ -64,6 +67,7 @@ class Recording {
   void open_next();
   void finish_file();
   void stop(const std::string& reason);
+  [[nodiscard]] std::string lack_of_space() const;
   void check_space();
   bool delete_oldest();
   [[nodiscard]] uint64_t recorded_bytes() const;
@@ -79,6 +83,7 @@ class Recording {
   std::map<std::string, int64_t> dropped_;
   State state_ = State::kRecording;
   std::string reason_;
+  std::string earlier_reason_;  ///< of an interruption that is over
   int64_t unwritten_ = 0;
   int64_t flushed_us_ = 0;
 };

@@ -121,6 +121,26 @@ TEST_CASE("over its quota a recording stops, or deletes the oldest files") {
   CHECK(fs::exists(recording.files().front()) != ring);
 }
 
+TEST_CASE("once there is room again, a stopped recording goes on in a new file, and the sidecar tells of the hole") {
+  const Folder folder;
+  RecorderConfig config = folder.config();
+  config.min_free = 1.0;
+  uint64_t free = uint64_t{1} << 29;
+  Recording recording(config, "a", [&](const fs::path&) { return free; });
+  REQUIRE(recording.state() == Recording::State::kStopped);
+  recording.write("IMU", 1, std::vector<uint8_t>(8));
+  free = (uint64_t{1} << 30) + 1;  // hardly more than the least: it would stop again at once
+  REQUIRE_FALSE(recording.try_again());
+  free = uint64_t{2} << 30;
+  REQUIRE(recording.try_again());
+  REQUIRE(recording.reason().empty());
+  recording.write("IMU", 2, std::vector<uint8_t>(8));
+  recording.close();
+  CHECK(recording.files().size() == 2);
+  CHECK(recording.unwritten() == 1);
+  CHECK(sidecar(folder.path() / "a.json").dump().find("for a while: ") != std::string::npos);
+}
+
 TEST_CASE("a disk that takes no more ends the recording with a reason, not the program") {
   const Folder folder;
   Recording recording(folder.config(), "a");
