@@ -78,7 +78,7 @@ class GnssInsStage final : public Stage {
     filter_->clear_records();
     if (pose_slot_.due(now_utime)) {
       pose_t pose{};
-      fill_ins_pose(filter_->output(), filter_->anchor(), pose);
+      fill_ins_pose(output_of(now_utime), filter_->anchor(), pose);
       outputs.publish(kPose, pose);
     }
     if (status_slot_.due(now_utime)) {
@@ -121,6 +121,16 @@ class GnssInsStage final : public Stage {
   [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
+  /// Where the newest samples were refused (no numbers, beyond any car), the state is of an earlier time: it must not
+  /// go out under this stamp as if it were new.
+  GnssInsOutput output_of(int64_t now_utime) {
+    GnssInsOutput output = filter_->output();
+    if (output.odometry.t_us >= now_utime || output.odometry.validity == Validity::kInvalid) return output;
+    output.odometry.validity = Validity::kInvalid;
+    output.reason = "the newest IMU samples are unusable";
+    return output;
+  }
+
   static std::vector<uint8_t> bytes_of(InsMemory& memory) {
     StateArchiveOut out;
     memory.serialise(out);
