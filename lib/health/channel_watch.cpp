@@ -19,6 +19,7 @@ constexpr int64_t kOldest_us = 12'000'000;
 /// Share of the intervals that must lie near their median before a channel counts as regular.
 constexpr double kRegularShare = 0.7;
 constexpr double kNear = 0.5;
+constexpr double kStale = 1.0;    // s after which the stamps of a channel without a rate say nothing any more
 constexpr double kScatter = 3.0;  // standard deviations of the arrival that a slow channel may be overdue
 /// A rate this much above the expected one is the new expectation.
 constexpr double kFaster = 1.2;
@@ -138,8 +139,9 @@ bool ChannelWatch::silent(int64_t now_us) const {
   return seconds(now_us - window_.back().now_us) > silent_after();
 }
 
-/// A fast channel may miss a message or two; a slow one is missed soon after it was due.
+/// 0: not known. A fast channel may miss a message or two; a slow one is missed soon after it was due.
 double ChannelWatch::silent_after() const {
+  if (!expected_hz_) return 0.0;
   const double period = 1.0 / *expected_hz_;
   const double due = period + std::max(limits_.silent_at_least, kScatter * jitter_s());
   return std::max(std::min(limits_.silent_periods * period, due), limits_.silent_at_least);
@@ -200,7 +202,7 @@ void ChannelWatch::judge_stamps(int64_t now_us, int64_t lag_us, std::vector<Cond
         condition("stamp_jump", Verdict::kDegraded, fmt::format("has stamps that jumped by {:+.1f} s", stamp_jump_s_)));
   }
   const std::optional<int64_t> lag = this->lag_us();
-  if (!lag) return;
+  if (!lag || seconds(now_us - window_.back().now_us) > std::max(kStale, 1.5 * silent_after())) return;
   const double latency = seconds(*lag - lag_us);
   if (latency > limits_.latency) {
     out.push_back(condition(

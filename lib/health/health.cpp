@@ -23,7 +23,9 @@ Health::Health(const HealthConfig& config, const Expectations& expectations)
   for (const ExpectedChannel& expected : expectations_.channels) {
     channels_.try_emplace(expected.name, expected.name, config_.channel, expected.rate);
   }
-  for (const std::string& process : expectations_.processes) processes_.try_emplace(process, process, config_.process);
+  for (const std::string& process : expectations_.processes) {
+    processes_.try_emplace(process, process, config_.process, true);
+  }
 }
 
 ChannelWatch& Health::channel(const std::string& name) {

@@ -37,7 +37,9 @@ struct ProcessReport {
 
 class ProcessWatch {
  public:
-  ProcessWatch(const std::string& name, const ProcessLimits& limits) : name_(name), limits_(limits) {}
+  /// `expected`: the vehicle has it; another one is missed only once it has shown that it lives.
+  ProcessWatch(const std::string& name, const ProcessLimits& limits, bool expected = false)
+      : name_(name), limits_(limits), expected_(expected) {}
 
   void heartbeat(int64_t now_us, const HeartbeatFacts& facts);
   void judge(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const;
@@ -51,6 +53,7 @@ class ProcessWatch {
 
   std::string name_;
   ProcessLimits limits_;
+  bool expected_;
   std::optional<HeartbeatFacts> newest_;
   int64_t now_us_ = 0;
   std::deque<int64_t> intervals_us_;  ///< between the last few heartbeats

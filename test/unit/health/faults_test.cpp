@@ -195,6 +195,25 @@ TEST_CASE("a process that beats fast is missed soon, a slow one later; a restart
   }
 }
 
+TEST_CASE("what spoke only once, as a forger does, is not missed for good; what is expected is") {
+  for (const bool expected : {false, true}) {
+    ProcessWatch watch("vo_tracker", ProcessLimits{}, expected);
+    watch.heartbeat(test::at(0.0), {});
+    std::vector<Condition> conditions;
+    watch.judge(test::at(20.0), 0, conditions);
+    CHECK(conditions.size() == (expected ? 1 : 0));
+  }
+  ChannelWatch watch("CAMERA_LEFT", ChannelLimits{}, std::nullopt);
+  const auto late = [&](double now_s) {
+    std::vector<Condition> conditions;
+    watch.judge(test::at(now_s), 0, 0, Verdict::kDegraded, conditions);
+    return !conditions.empty();
+  };
+  watch.arrived({test::at(10.0), test::at(-3600.0), 1, 1, 100, std::nullopt});
+  CHECK(late(10.5));
+  CHECK_FALSE(late(11.5));
+}
+
 TEST_CASE("a slow sensor is missed soon after it was due, unless it comes irregularly") {
   for (const int64_t scatter_us : {0, 200'000}) {
     ChannelWatch watch("GNSS", ChannelLimits{}, 1.0);
