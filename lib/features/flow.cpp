@@ -1,63 +1,54 @@
 #include "features/flow.h"
 
 #include <algorithm>
-#include <opencv2/video/tracking.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "features/patch.h"
 
 namespace roadfix {
 namespace {
 
-constexpr int kIterations = 30;
-constexpr double kEnoughPx = 0.01;
-constexpr double kMinEigenvalue = 1e-4;  ///< OpenCV's default: flat patches are refused
-constexpr int kLevelsBack = 1;           ///< the way back begins where it should end
-
-std::vector<cv::Point2f> to_cv(std::span<const Eigen::Vector2f> points) {
-  std::vector<cv::Point2f> out;
-  out.reserve(points.size());
-  for (const Eigen::Vector2f& p : points) out.emplace_back(p.x(), p.y());
-  return out;
-}
-
-std::vector<uint8_t> lucas_kanade(const FlowPyramid& first, const FlowPyramid& second,
-                                  const std::vector<cv::Point2f>& from, std::vector<cv::Point2f>& to,
-                                  const FlowConfig& config, int levels) {
-  std::vector<uint8_t> found;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(first.mats, second.mats, from, to, found, error,
-                           cv::Size(config.window_px, config.window_px), levels,
-                           cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kIterations, kEnoughPx),
-                           cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
-  return found;
-}
+constexpr double kMinCorrelation = 0.5;  ///< of a coarse patch, which may hold more than one thing
+constexpr int kMargin = 4;               ///< px of a level between its edge and a patch, for the way outwards
+constexpr int kMinSide = 16;             ///< px; smaller copies say nothing
 
 }  // namespace
 
-FlowPyramid flow_pyramid(const cv::Mat& gray, const FlowConfig& config, FlowPyramid spare) {
+FlowPyramid flow_pyramid(const cv::Mat& gray, int levels, FlowPyramid spare) {
   FlowPyramid pyramid = std::move(spare);
-  cv::buildOpticalFlowPyramid(gray, pyramid.mats, cv::Size(config.window_px, config.window_px), config.levels, true,
-                              cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);  // a copy: the caller may reuse gray
+  pyramid.levels.resize(static_cast<size_t>(levels) + 1);
+  gray.copyTo(pyramid.levels[0]);  // the caller may use its picture again
+  size_t made = 1;
+  for (; made < pyramid.levels.size(); ++made) {
+    const cv::Mat& below = pyramid.levels[made - 1];
+    if (std::min(below.cols, below.rows) < 2 * kMinSide) break;
+    cv::pyrDown(below, pyramid.levels[made]);
+  }
+  pyramid.levels.resize(made);
   return pyramid;
 }
 
-std::vector<bool> follow(const FlowPyramid& first, const FlowPyramid& second, std::span<const Eigen::Vector2f> from,
-                         std::span<Eigen::Vector2f> to, const FlowConfig& config) {
-  std::vector<bool> good(from.size(), false);
-  if (from.empty()) return good;
-  const std::vector<cv::Point2f> start = to_cv(from);
-  std::vector<cv::Point2f> end = to_cv(to);
-  const std::vector<uint8_t> there = lucas_kanade(first, second, start, end, config, config.levels);
-  std::vector<cv::Point2f> back = start;
-  const std::vector<uint8_t> returned =
-      lucas_kanade(second, first, end, back, config, std::min(kLevelsBack, config.levels));
-  const cv::Size size = first.picture().size();
-  for (size_t i = 0; i < from.size(); ++i) {
-    const bool inside = end[i].x >= 0.0F && end[i].y >= 0.0F && end[i].x <= static_cast<float>(size.width - 1) &&
-                        end[i].y <= static_cast<float>(size.height - 1);
-    const double round_trip = cv::norm(back[i] - start[i]);
-    good[i] = there[i] != 0 && returned[i] != 0 && inside && round_trip <= config.max_round_trip_px;
-    to[i] = {end[i].x, end[i].y};
+Eigen::Vector2f approach(const FlowPyramid& first, const FlowPyramid& second, const Eigen::Vector2f& from,
+                         const Eigen::Vector2f& to, int window_px) {
+  const PatchConfig config{window_px, kMinCorrelation, 0.0};
+  Eigen::Vector2f found = to;
+  for (size_t level = std::min(first.levels.size(), second.levels.size()) - 1; level > 0; --level) {
+    const float shrink = 1.0F / static_cast<float>(1 << level);
+    const cv::Mat& gray = first.picture(level);
+    const auto reach = static_cast<float>(window_px / 2 + kMargin);
+    const Eigen::Vector2f wanted = shrink * from,
+                          last(static_cast<float>(gray.cols - 1) - reach, static_cast<float>(gray.rows - 1) - reach);
+    const Eigen::Vector2f inside = wanted.cwiseMin(last).cwiseMax(reach);  // beside a point near the edge
+    auto patch = cut_patch(gray, inside, window_px);
+    if (!patch) continue;
+    patch->offset += wanted - inside;
+    Placement start;
+    start.centre = shrink * found - patch->offset;
+    if (const auto placed = place_patch(*patch, second.picture(level), start, config)) {
+      found = placed->point(*patch) / shrink;
+    }
   }
-  return good;
+  return found;
 }
 
 }  // namespace roadfix

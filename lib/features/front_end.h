@@ -29,9 +29,10 @@ struct FrontEndConfig {
   double min_distance_px = 16.0;  ///< between two tracks when the second begins
   int fast_threshold = 8;         ///< grey levels by which a corner's ring differs from its centre
   // Optical flow.
-  int klt_window_px = 11;              ///< larger ones see more of a slanted wall move, and a drive comes out too short
-  int klt_levels = 3;                  ///< pyramid levels above the picture itself
-  double klt_max_round_trip_px = 0.7;  ///< there and back again
+  int klt_window_px = 11;            ///< odd
+  int klt_levels = 3;                ///< pyramid levels above the picture itself
+  double klt_min_correlation = 0.8;  ///< of a patch with what it was when it was taken
+  double klt_shape_std = 0.1;        ///< change of a patch's shape from picture to picture; zero: patches keep theirs
   // Descriptors.
   int orb_levels = 6;                   ///< pyramid levels, each 1.2 times smaller
   double match_radius_px = 60.0;        ///< around the place where a track is expected
@@ -50,9 +51,10 @@ void visit(FrontEndConfig& c, Visitor& v) {
   v.integer("max_features", c.max_features, 50, 5000);
   v.number("min_distance_px", c.min_distance_px, 2.0, 100.0);
   v.integer("fast_threshold", c.fast_threshold, 1, 100);
-  v.integer("klt_window_px", c.klt_window_px, 5, 51);
+  v.integer("klt_window_px", c.klt_window_px, 5, 31);
   v.integer("klt_levels", c.klt_levels, 0, 6);
-  v.number("klt_max_round_trip_px", c.klt_max_round_trip_px, 0.05, 10.0);
+  v.number("klt_min_correlation", c.klt_min_correlation, 0.0, 1.0);
+  v.number("klt_shape_std", c.klt_shape_std, 0.0, 1.0);
   v.integer("orb_levels", c.orb_levels, 1, 12);
   v.number("match_radius_px", c.match_radius_px, 1.0, 1000.0);
   v.number("match_ratio", c.match_ratio, 0.1, 1.0);

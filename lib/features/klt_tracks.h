@@ -1,11 +1,13 @@
-/// Optical flow front end: corners followed by pyramidal Lucas-Kanade (Bouguet, 2001) from each picture to the next,
-/// there and back again. The cheap default.
+/// Optical flow front end: corners followed from picture to picture. The last picture says roughly where (coarse to
+/// fine), the patch as it was first seen says exactly where: errors do not add up from picture to picture. The patch's
+/// shape is followed too, and it is taken anew once it has changed much. The cheap default.
 #pragma once
 
-#include <map>
+#include <optional>
 
 #include "features/flow.h"
 #include "features/front_end.h"
+#include "features/patch.h"
 
 namespace roadfix {
 
@@ -22,12 +24,23 @@ class KltTracks final : public FrontEnd {
   [[nodiscard]] int num_expected() const override { return num_expected_; }
 
  private:
+  struct Track {
+    Feature feature;  ///< where it is in the last picture
+    Patch patch;
+    Placement place;  ///< of the patch in the last picture
+  };
+  [[nodiscard]] PatchConfig patch_config() const;
+  /// The track in the new picture, which is near `expected`; nothing where it is not found.
+  [[nodiscard]] std::optional<Track> found(const Track& track, const Eigen::Vector2f& expected,
+                                           const FlowPyramid& pyramid) const;
+  [[nodiscard]] std::vector<Feature> features() const;
+
   FrontEndConfig config_;
   int64_t next_track_ = 1;
   int num_expected_ = 0;
-  std::vector<Feature> live_;  ///< ascending by track, where they are in the last picture
-  FlowPyramid spare_;          ///< of the picture before, for its memory
-  FlowPyramid pyramid_;        ///< of the last picture, whose pixels are its first level
+  std::vector<Track> live_;  ///< ascending by number
+  FlowPyramid spare_;        ///< of the picture before, for its memory
+  FlowPyramid pyramid_;      ///< of the last picture
 };
 
 }  // namespace roadfix

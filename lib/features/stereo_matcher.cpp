@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "features/flow.h"
+#include "features/patch.h"
 #include "geometry/so3.h"
 
 namespace roadfix {
@@ -11,8 +13,6 @@ namespace {
 constexpr int kSearchLevel = 1;  ///< of the pyramid: half the size
 constexpr int kSearchHalf = 4;   ///< patches of 9 x 9 pixels at that level
 constexpr int kPatch = (2 * kSearchHalf + 1) * (2 * kSearchHalf + 1);
-constexpr int kRefineLevels = 1;
-constexpr int kRefineWindow = 16;  ///< a multiple of 8: OpenCV takes eight pixels of a row at a time
 
 struct Patch {
   std::array<int, kPatch> value{};
@@ -90,7 +90,8 @@ std::optional<Eigen::Vector2f> StereoMatcher::search(const cv::Mat& left, const 
   for (int i = 0; i <= steps; ++i) {
     const auto candidate = right_pixel(normalised, nearest * i / steps);
     if (!candidate) continue;
-    const Eigen::Vector2i at = round_to_level(*candidate);
+    // The way is rounded, not the place: both patches then lie alike between the pixels of the level.
+    const Eigen::Vector2i at = centre + round_to_level(*candidate - pixel);
     if (at == last) continue;
     last = at;
     const auto patch = patch_at(right, at.x(), at.y());
@@ -113,29 +114,24 @@ double StereoMatcher::epipolar_error_px(const Eigen::Vector2d& left, const Eigen
 std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& left, const cv::Mat& right,
                                                                  std::span<const StereoQuery> queries) const {
   std::vector<std::optional<Eigen::Vector2f>> result(queries.size());
-  const FlowConfig flow{kRefineWindow, kRefineLevels, config_.max_round_trip_px};
-  const FlowPyramid left_pyramid = flow_pyramid(left, flow), right_pyramid = flow_pyramid(right, flow);
-  if (left_pyramid.levels() <= kSearchLevel || right_pyramid.levels() <= kSearchLevel) return result;
-
-  std::vector<size_t> index;
-  std::vector<Eigen::Vector2f> from, to;
+  const FlowPyramid left_pyramid = flow_pyramid(left, kSearchLevel), right_pyramid = flow_pyramid(right, kSearchLevel);
+  if (left_pyramid.levels.size() <= kSearchLevel || right_pyramid.levels.size() <= kSearchLevel) return result;
+  const PatchConfig patches{config_.window_px, config_.min_correlation, config_.shape_std};
   for (size_t i = 0; i < queries.size(); ++i) {
     const auto normalised = left_.unproject(queries[i].pixel.cast<double>());
-    if (!normalised) continue;
-    const auto start = queries[i].depth ? right_pixel(*normalised, 1.0 / *queries[i].depth)
+    const auto patch = cut_patch(left, queries[i].pixel, patches.window_px);
+    if (!normalised || !patch) continue;
+    const auto begin = queries[i].depth ? right_pixel(*normalised, 1.0 / *queries[i].depth)
                                         : search(left_pyramid.picture(kSearchLevel),
                                                  right_pyramid.picture(kSearchLevel), queries[i].pixel, *normalised);
-    if (!start) continue;
-    index.push_back(i);
-    from.push_back(queries[i].pixel);
-    to.push_back(*start);
-  }
-  const std::vector<bool> found = follow(left_pyramid, right_pyramid, from, to, flow);
-  for (size_t k = 0; k < index.size(); ++k) {
-    if (!found[k]) continue;
-    const auto l = left_.unproject(from[k].cast<double>());
-    const auto r = right_.unproject(to[k].cast<double>());
-    if (l && r && epipolar_error_px(*l, *r) <= config_.max_epipolar_px) result[index[k]] = to[k];
+    if (!begin) continue;
+    Placement start;
+    start.centre = approach(left_pyramid, right_pyramid, queries[i].pixel, *begin, patches.window_px) - patch->offset;
+    const auto place = place_patch(*patch, right, start, patches);
+    if (!place) continue;
+    const Eigen::Vector2f found = place->point(*patch);
+    const auto seen = right_.unproject(found.cast<double>());
+    if (seen && epipolar_error_px(*normalised, *seen) <= config_.max_epipolar_px) result[i] = found;
   }
   return result;
 }

@@ -1,5 +1,6 @@
-/// Finds points of the left picture in the right one: a coarse search along the epipolar curve, then Lucas-Kanade, then
-/// a test of the distance from the curve. Works for any two overlapping cameras; nothing is rectified.
+/// Finds points of the left picture in the right one: a coarse search along the epipolar curve, then the patch's place
+/// and shape (a road at a slant is sheared), then a test of the distance from the curve. Works for any two overlapping
+/// cameras; nothing is rectified.
 #pragma once
 
 #include <Eigen/Dense>
@@ -9,16 +10,16 @@
 #include <vector>
 
 #include "camera/camera.h"
-#include "features/flow.h"
 #include "geometry/se3.h"
 
 namespace roadfix {
 
 struct StereoConfig {
-  double min_depth_m = 2.0;        ///< nearest point that is looked for
-  double max_epipolar_px = 1.0;    ///< distance from the epipolar line
-  double min_correlation = 0.8;    ///< of the coarse patches, normalised
-  double max_round_trip_px = 0.7;  ///< left to right and back
+  double min_depth_m = 2.0;      ///< nearest point that is looked for
+  double max_epipolar_px = 1.0;  ///< distance from the epipolar line
+  double min_correlation = 0.8;  ///< of the coarse patches and of the fine ones, normalised
+  int window_px = 11;            ///< of the fine patches, odd
+  double shape_std = 0.2;        ///< of each number of a patch's shape in the right eye
 };
 
 template <class Visitor>
@@ -26,7 +27,8 @@ void visit(StereoConfig& c, Visitor& v) {
   v.number("min_depth_m", c.min_depth_m, 0.1, 100.0);
   v.number("max_epipolar_px", c.max_epipolar_px, 0.1, 10.0);
   v.number("min_correlation", c.min_correlation, 0.0, 1.0);
-  v.number("max_round_trip_px", c.max_round_trip_px, 0.05, 10.0);
+  v.integer("window_px", c.window_px, 5, 31);
+  v.number("shape_std", c.shape_std, 0.0, 1.0);
 }
 
 struct StereoQuery {

@@ -72,6 +72,29 @@ TEST_CASE("a hint finds what flow alone cannot") {
   CHECK(found_share(false) < 0.1);
 }
 
+/// Share of the tracks found within 0.2 px after the picture has moved and its grey levels have changed.
+double share_after_exposure(double gain, double offset) {
+  const auto front_end = make_front_end({});
+  const cv::Mat first = texture(640, 240, 5);
+  (void)front_end->track(first, {});
+  std::map<int64_t, Eigen::Vector2f> begun;
+  for (const Feature& f : front_end->replenish()) begun[f.track] = f.pixel;
+  cv::Mat second;
+  shifted(first, 2.25, -1.5).convertTo(second, CV_8UC1, gain, offset);
+  int exact = 0;
+  for (const Feature& f : front_end->track(second, {})) {
+    exact += (f.pixel - begun.at(f.track) - Eigen::Vector2f(2.25F, -1.5F)).norm() < 0.2F ? 1 : 0;
+  }
+  return static_cast<double>(exact) / static_cast<double>(begun.size());
+}
+
+TEST_CASE("a change of exposure loses no tracks, one that leaves no picture does") {
+  CHECK(share_after_exposure(1.0, 0.0) > 0.9);
+  CHECK(share_after_exposure(0.4, 0.0) > 0.9);
+  CHECK(share_after_exposure(0.5, 80.0) > 0.9);
+  CHECK(share_after_exposure(8.0, 0.0) < 0.2);  // teeth: nearly all of it white
+}
+
 TEST_CASE("dropped tracks end, new ones get new numbers, black pictures end all") {
   const auto front_end = make_front_end({});
   const cv::Mat picture = texture(640, 240, 5);

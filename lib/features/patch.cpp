@@ -1,0 +1,217 @@
+#include "features/patch.h"
+
+#include <array>
+#include <cmath>
+
+namespace roadfix {
+namespace {
+
+constexpr int kLanes = 8;  ///< sums run in so many columns: a fixed order that fits vector registers
+constexpr int kMaxPixels = (kMaxPatchWindow * kMaxPatchWindow + kLanes - 1) / kLanes * kLanes;
+constexpr int kMaxIterations = 20;
+constexpr float kEnoughPx = 0.01F;       ///< a step that moves no pixel of the patch by more is the last
+constexpr float kGreyNoise = 3.0F;       ///< grey levels: the camera's and interpolation's
+constexpr float kMaxPlaceStd_px = 0.3F;  ///< that this noise gives the place; more: the patch is flat
+constexpr float kMinGain = 0.1F, kMaxGain = 10.0F;
+
+using Pixels = std::array<float, kMaxPixels>;
+using Lanes = Eigen::Array<float, kLanes, 1>;
+template <int N>
+using Vector = Eigen::Matrix<float, N, 1>;
+template <int N>
+using Square = Eigen::Matrix<float, N, N>;
+
+Eigen::Map<const Lanes> lanes(const Pixels& pixels, int i) { return Eigen::Map<const Lanes>(pixels.data() + i); }
+Eigen::Map<Lanes> lanes(Pixels& pixels, int i) { return Eigen::Map<Lanes>(pixels.data() + i); }
+
+float total(const Lanes& x) { return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])); }
+
+float dot(const Pixels& a, const Pixels& b, int n) {
+  Lanes sum = Lanes::Zero();
+  for (int i = 0; i < n; i += kLanes) sum += lanes(a, i) * lanes(b, i);
+  return total(sum);
+}
+
+float sum_of(const Pixels& a, int n) {
+  Lanes sum = Lanes::Zero();
+  for (int i = 0; i < n; i += kLanes) sum += lanes(a, i);
+  return total(sum);
+}
+
+/// The patch without its mean, its derivatives by place (and shape, in pixels at the patch's edge) with mean and grey
+/// pattern projected out, and what follows from them. Pixels beyond the last are zero.
+template <int N>
+struct Model {
+  int side = 0, count = 0, padded = 0;
+  Pixels value{};
+  std::array<Pixels, N> slope{};
+  float energy = 0.0F;
+  Square<N> inverse;  ///< of Gauss-Newton's matrix with the prior
+};
+
+template <int N>
+void centre(Pixels& pixels, const Model<N>& m) {
+  const float mean = sum_of(pixels, m.padded) / static_cast<float>(m.count);
+  for (int i = 0; i < m.count; ++i) pixels[static_cast<size_t>(i)] -= mean;
+}
+
+/// False where the patch is too flat.
+template <int N>
+bool prepare(const Patch& patch, int side, float prior, Model<N>& m) {
+  m.side = side;
+  m.count = side * side;
+  m.padded = (m.count + kLanes - 1) / kLanes * kLanes;
+  const int stride = side + 2, half = side / 2;
+  const float edge = 1.0F / static_cast<float>(std::max(1, half));
+  size_t i = 0;
+  for (int row = 0; row < side; ++row) {
+    const uint8_t* line = patch.grey.data() + static_cast<ptrdiff_t>(row + 1) * stride + 1;
+    const float y = static_cast<float>(row - half) * edge;
+    for (int column = 0; column < side; ++column, ++i) {
+      const float x = static_cast<float>(column - half) * edge;
+      const float gx = 0.5F * static_cast<float>(line[column + 1] - line[column - 1]);
+      const float gy = 0.5F * static_cast<float>(line[column + stride] - line[column - stride]);
+      m.value[i] = static_cast<float>(line[column]);
+      m.slope[0][i] = gx;
+      m.slope[1][i] = gy;
+      if constexpr (N == 6) {
+        m.slope[2][i] = gx * x;
+        m.slope[3][i] = gx * y;
+        m.slope[4][i] = gy * x;
+        m.slope[5][i] = gy * y;
+      }
+    }
+  }
+  centre(m.value, m);
+  m.energy = dot(m.value, m.value, m.padded);
+  if (!(m.energy > 0.0F)) return false;
+  for (Pixels& slope : m.slope) {
+    centre(slope, m);
+    const float share = dot(slope, m.value, m.padded) / m.energy;
+    for (int k = 0; k < m.padded; k += kLanes) lanes(slope, k) -= share * lanes(m.value, k);
+  }
+  Square<N> H;
+  for (int a = 0; a < N; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      H(a, b) = H(b, a) = dot(m.slope[static_cast<size_t>(a)], m.slope[static_cast<size_t>(b)], m.padded);
+    }
+    if (a >= 2) H(a, a) += prior;
+  }
+  const Eigen::LDLT<Square<N>> factors(H);
+  m.inverse = factors.solve(Square<N>::Identity());
+  const float widest = m.inverse.template topLeftCorner<2, 2>().trace();  // at least the larger eigenvalue
+  return factors.info() == Eigen::Success && widest >= 0.0F &&
+         kGreyNoise * kGreyNoise * widest < kMaxPlaceStd_px * kMaxPlaceStd_px;
+}
+
+/// Grey levels where the placement puts the patch's pixels; false where one lies outside the picture.
+bool sample(const cv::Mat& gray, const Placement& place, int side, bool upright, Pixels& out) {
+  const auto half = static_cast<float>(side / 2);
+  const float reach_u = (std::abs(place.shape(0, 0)) + std::abs(place.shape(0, 1))) * half;
+  const float reach_v = (std::abs(place.shape(1, 0)) + std::abs(place.shape(1, 1))) * half;
+  const float u0 = place.centre.x(), v0 = place.centre.y();
+  if (!(u0 - reach_u >= 0.0F && v0 - reach_v >= 0.0F && u0 + reach_u < static_cast<float>(gray.cols - 1) &&
+        v0 + reach_v < static_cast<float>(gray.rows - 1))) {
+    return false;
+  }
+  size_t i = 0;
+  if (upright) {  // every pixel lies alike between its neighbours
+    const float left = u0 - half, top = v0 - half;
+    const auto column = static_cast<int>(left), row = static_cast<int>(top);
+    const float a = left - static_cast<float>(column), b = top - static_cast<float>(row);
+    const float w00 = (1 - a) * (1 - b), w01 = a * (1 - b), w10 = (1 - a) * b, w11 = a * b;
+    for (int r = 0; r < side; ++r) {
+      const uint8_t* p = gray.ptr<uint8_t>(row + r) + column;
+      const uint8_t* q = gray.ptr<uint8_t>(row + r + 1) + column;
+      float* to = out.data() + i;
+      for (int c = 0; c < side; ++c) {
+        to[c] = w00 * static_cast<float>(p[c]) + w01 * static_cast<float>(p[c + 1]) + w10 * static_cast<float>(q[c]) +
+                w11 * static_cast<float>(q[c + 1]);
+      }
+      i += static_cast<size_t>(side);
+    }
+    return true;
+  }
+  const float su = place.shape(0, 0), sv = place.shape(1, 0);
+  for (int r = 0; r < side; ++r) {
+    const float y = static_cast<float>(r) - half;
+    const float u_row = u0 + place.shape(0, 1) * y - su * half, v_row = v0 + place.shape(1, 1) * y - sv * half;
+    for (int c = 0; c < side; ++c, ++i) {
+      const float u = std::max(0.0F, u_row + su * static_cast<float>(c));  // rounding may pass the edge
+      const float v = std::max(0.0F, v_row + sv * static_cast<float>(c));
+      const auto column = static_cast<int>(u), row = static_cast<int>(v);
+      const float a = u - static_cast<float>(column), b = v - static_cast<float>(row);
+      const uint8_t* p = gray.ptr<uint8_t>(row) + column;
+      const uint8_t* q = p + gray.step[0];
+      const float above = static_cast<float>(p[0]) + a * static_cast<float>(p[1] - p[0]);
+      const float below = static_cast<float>(q[0]) + a * static_cast<float>(q[1] - q[0]);
+      out[i] = above + b * (below - above);
+    }
+  }
+  return true;
+}
+
+template <int N>
+std::optional<Placement> place(const Patch& patch, const cv::Mat& gray, const Placement& start,
+                               const PatchConfig& config) {
+  const int side = config.window_px;
+  const auto half = static_cast<float>(side / 2);
+  const float edge_std = half * static_cast<float>(config.shape_std);
+  const float prior = N == 6 ? kGreyNoise * kGreyNoise / (edge_std * edge_std) : 0.0F;
+  Model<N> m;
+  if (!prepare(patch, side, prior, m)) return std::nullopt;
+  const bool upright = N == 2 && start.shape.isIdentity(0.0F);
+  const Eigen::Matrix2f start_inverse = start.shape.inverse();
+  Placement now = start;
+  Pixels seen{};
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    if (!sample(gray, now, side, upright, seen)) return std::nullopt;
+    const float mean = sum_of(seen, m.padded) / static_cast<float>(m.count);
+    const float spread = dot(seen, seen, m.padded) - mean * mean * static_cast<float>(m.count);
+    const float gain = std::sqrt(spread / m.energy);  // also where the patches do not match yet
+    if (!(gain > kMinGain && gain < kMaxGain)) return std::nullopt;
+    now.correlation = dot(m.value, seen, m.padded) / (gain * m.energy);
+    Vector<N> b;
+    for (int k = 0; k < N; ++k) b[k] = dot(m.slope[static_cast<size_t>(k)], seen, m.padded) / gain;
+    if constexpr (N == 6) {
+      const Eigen::Matrix2f off = start_inverse * now.shape - Eigen::Matrix2f::Identity();
+      b.template tail<4>() += prior * half * Vector<4>(off(0, 0), off(0, 1), off(1, 0), off(1, 1));
+    }
+    const Vector<N> step = m.inverse * b;
+    Eigen::Matrix2f change = Eigen::Matrix2f::Identity();
+    if constexpr (N == 6) {
+      change += (Eigen::Matrix2f() << step[2], step[3], step[4], step[5]).finished() / half;
+      now.shape = now.shape * change.inverse();
+    }
+    now.centre -= now.shape * step.template head<2>();
+    if (!now.centre.allFinite() || !now.shape.allFinite()) return std::nullopt;
+    if ((now.centre - start.centre).cwiseAbs().maxCoeff() > 2.0F * half) return std::nullopt;
+    if (step.cwiseAbs().maxCoeff() < kEnoughPx) break;
+  }
+  if (now.correlation < static_cast<float>(config.min_correlation)) return std::nullopt;
+  return now;
+}
+
+}  // namespace
+
+std::optional<Patch> cut_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel, int window_px) {
+  const int reach = window_px / 2 + 1;
+  if (!pixel.allFinite() || pixel.cwiseAbs().maxCoeff() > 1e6F) return std::nullopt;
+  const auto u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+  if (u < reach || v < reach || u >= gray.cols - reach || v >= gray.rows - reach) return std::nullopt;
+  Patch patch;
+  patch.offset = pixel - Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
+  patch.grey.reserve(static_cast<size_t>((window_px + 2) * (window_px + 2)));
+  for (int row = v - reach; row <= v + reach; ++row) {
+    const uint8_t* line = gray.ptr<uint8_t>(row) + u;
+    patch.grey.insert(patch.grey.end(), line - reach, line + reach + 1);
+  }
+  return patch;
+}
+
+std::optional<Placement> place_patch(const Patch& patch, const cv::Mat& gray, const Placement& start,
+                                     const PatchConfig& config) {
+  return config.shape_std > 0.0 ? place<6>(patch, gray, start, config) : place<2>(patch, gray, start, config);
+}
+
+}  // namespace roadfix
