@@ -35,11 +35,13 @@ GnssIns::GnssIns(const GnssInsConfig& config)
       applier_(config),
       gates_(config.aiding.gate_sigma),
       no_gates_(1e3),
+      no_use_(1e3),
       monitor_(config),
       screen_(config.screen),
       bank_(config),
       lag_us_(lag_of(prior_age(config.vehicle))) {
   no_gates_.nis.fill(1e12);
+  no_use_.nis.fill(-1.0);
   records_.reserve(1024);
 }
 

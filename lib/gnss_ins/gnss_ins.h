@@ -87,6 +87,7 @@ class GnssIns {
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
   void use_position(const Pending& measured);
+  void weigh_by_itself(const Pending& measured, NoiseScale& noise);
   /// While coasting: when position or zero velocity was last used.
   [[nodiscard]] std::optional<int64_t> coasting_since() const;
   [[nodiscard]] bool agrees_with(AidingSource source, int64_t t_us) const;
@@ -104,7 +105,7 @@ class GnssIns {
 
   GnssInsConfig config_;
   AidingApplier applier_;
-  Gates gates_, no_gates_;
+  Gates gates_, no_gates_, no_use_;                  // as configured; that pass all; that pass nothing
   std::array<PositionQuality, 6> position_quality_;  // by FixType
   NoiseScale velocity_noise_;
   ImuMonitor monitor_;

@@ -15,6 +15,10 @@ constexpr double kOutage = 3.0;          // s without a position, after which a 
 // Correlation time of the errors of fixes without a fixed carrier phase, until they have shown theirs: multipath and
 // code smoothing last seconds to a minute (Misra and Enge, Global Positioning System, 2006, ch. 5).
 constexpr double kCodeAlike = 5.0;  // s
+// Of such fixes after an outage: variances as if two of them had been off by three of their sigmas. Receivers come back
+// metres off and do not say so; chosen between the error that this leaves and what it costs where they are good.
+constexpr double kReturnFactor = 10.0;
+constexpr double kReturnCount = 2.0;
 
 }  // namespace
 
@@ -49,13 +53,21 @@ void GnssIns::use_position(const Pending& measured) {
   PositionQuality& quality = position_quality_[static_cast<size_t>(p.fix_type)];
   const double since = position_at_us_ == 0 ? 2.0 * kOutage : seconds_between(position_at_us_, p.t_us);
   if (since > kOutage) {
+    // A fixed carrier phase was checked against its neighbours before it was called so.
     const double alike = std::exp(-fix_interval_ / kCodeAlike);
-    for (size_t type = 0; type < position_quality_.size(); ++type)
-      position_quality_[type].correlation.assume(type == static_cast<size_t>(FixType::kRtkFixed) ? 0.0 : alike);
+    const bool returned = position_at_us_ != 0 && config_.aiding.use_outage_doubt;
+    for (size_t type = 0; type < position_quality_.size(); ++type) {
+      const bool fixed = type == static_cast<size_t>(FixType::kRtkFixed);
+      PositionQuality& doubtful = position_quality_[type];
+      doubtful.correlation.assume(fixed ? 0.0 : alike);
+      if (returned) doubtful.noise.doubt(fixed ? 1.0 : kReturnFactor, fixed ? 0.0 : kReturnCount);
+    }
   } else if (since > 0.0) {
     fix_interval_ = since;
   }
   position_at_us_ = p.t_us;
+  const bool doubted = quality.noise.doubted();
+  if (doubted) weigh_by_itself(p, quality.noise);
   p.cov *= quality.noise.variance_factor();
   if (config_.aiding.use_error_correlation) p.alike = quality.correlation.inflation();
 
@@ -64,7 +76,7 @@ void GnssIns::use_position(const Pending& measured) {
   const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
   const bool heading_holds = agrees_with(AidingSource::kGnssVelocity, p.t_us);
   const bool dragged = jump_.one_sided() && (heading_holds || agrees_with(AidingSource::kWheelSpeed, p.t_us));
-  if (!jumped && !dragged) quality.noise.learn(r);
+  if (!jumped && !dragged && !(doubted && r.status == AidingStatus::kAccepted)) quality.noise.learn(r);
   if (r.status == AidingStatus::kGated) {
     const AidingRecord level = applier_.apply_level(*core_, p, gates_);
     if (level.status == AidingStatus::kAccepted) {
@@ -97,6 +109,16 @@ void GnssIns::use_position(const Pending& measured) {
     }
   }
   note(r, p.id);
+}
+
+/// The fix teaches the noise before it is used, (M.37). What the gate refuses teaches nothing.
+void GnssIns::weigh_by_itself(const Pending& measured, NoiseScale& noise) {
+  Pending p = measured;
+  p.cov *= noise.variance_factor();
+  AidingRecord tried = applier_.apply(*core_, p, no_use_);
+  if (tried.status != AidingStatus::kGated || tried.nis > gates_.nis[3]) return;
+  tried.status = AidingStatus::kAccepted;
+  noise.learn(tried);
 }
 
 void GnssIns::recover(const Pending& p) {

@@ -128,3 +128,83 @@ TEST_CASE("errors that stay alike under a bridge are not averaged away") {
   CHECK(share > 0.99);
   CHECK(naive < 0.98);
 }
+
+namespace {
+
+struct Return {
+  double honest = 0.0;  ///< share of the level errors within three of their sigmas, over 20 s after the tunnel
+  double error = 0.0;   ///< m, root mean square of the level errors over the same time
+  double sigma = 0.0;   ///< m, likewise of what is claimed
+};
+
+/// A bridge and a minute of tunnel; the fixes after it are off by `reacquire` (nothing: as good as before) and do not
+/// say so.
+Return return_from_tunnel(const char* reacquire, FixType type, double sigma_m, bool doubts) {
+  int inside = 0, scored = 0;
+  double squares = 0.0, variances = 0.0;
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    ScenarioConfig s = scenario("tunnel_dark");
+    s.duration_s = 172.0;
+    s.gnss.fix_type = type;
+    s.gnss.sigma_horizontal_m = sigma_m;
+    s.gnss.sigma_up_m = 2.0 * sigma_m;
+    s.faults.pop_back();  // its own return
+    if (reacquire != nullptr) s.faults.push_back(parse_fault(reacquire));
+    const SimulatedDrive drive = simulate(s, seed);
+    s.faults.clear();
+    GnssInsConfig config = test::filter_config(s);
+    config.aiding.use_outage_doubt = doubts;
+    GnssIns filter(config);
+    int64_t next = drive.imu.front().t_us + 151'000'000;
+    const int64_t last = next + 20'000'000;
+    test::run(filter, test::Samples(drive), [&](GnssIns& f, int64_t now) {
+      f.clear_records();
+      if (now < next || now > last) return;
+      next += 500'000;
+      const Odometry o = f.output().odometry;
+      const auto e = test::error_of(f, o, drive);
+      for (int i = 0; i < 2; ++i) {
+        inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
+        squares += e(i) * e(i);
+        variances += o.cov_pose(i, i);
+      }
+      scored += 2;
+    });
+  }
+  return {static_cast<double>(inside) / scored, std::sqrt(squares / scored), std::sqrt(variances / scored)};
+}
+
+}  // namespace
+
+TEST_CASE("fixes that come back displaced after a tunnel are not believed at their word") {
+  struct Case {
+    const char* fault;
+    double honest;  // least share; two metres for five seconds hide within what the tunnel left unknown
+  };
+  for (const Case& c : {Case{"gnss.reacquire@150+12:error_m=4,decay_s=3", 0.99},
+                        Case{"gnss.reacquire@150+20:error_m=8,decay_s=2", 0.99},
+                        Case{"gnss.reacquire@150+12:error_m=2,decay_s=5", 0.94}}) {
+    const Return doubting = return_from_tunnel(c.fault, FixType::kDifferential, 0.3, true);
+    const Return trusting = return_from_tunnel(c.fault, FixType::kDifferential, 0.3, false);
+    CAPTURE(c.fault, doubting.honest, doubting.error, trusting.honest, trusting.error);
+    std::printf("%s: within three sigma %.3f, error %.3f m, claimed %.3f m; trusting: %.3f, %.3f m, %.3f m\n", c.fault,
+                doubting.honest, doubting.error, doubting.sigma, trusting.honest, trusting.error, trusting.sigma);
+    CHECK(doubting.honest > c.honest);
+    CHECK(trusting.honest < 0.93);
+    CHECK(doubting.error < trusting.error);
+  }
+}
+
+TEST_CASE("what good fixes lose after a tunnel by the doubt is bounded") {
+  const auto compare = [](FixType type, double sigma, double most) {
+    const Return doubting = return_from_tunnel(nullptr, type, sigma, true);
+    const Return trusting = return_from_tunnel(nullptr, type, sigma, false);
+    std::printf("good fixes of %.2f m after a tunnel: error %.4f m, claimed %.4f m; trusting: %.4f m, %.4f m\n", sigma,
+                doubting.error, doubting.sigma, trusting.error, trusting.sigma);
+    CHECK(doubting.honest > 0.99);
+    CHECK(doubting.error < most * trusting.error);
+    CHECK(doubting.sigma < most * trusting.sigma);
+  };
+  compare(FixType::kRtkFixed, 0.02, 1.1);
+  compare(FixType::kDifferential, 0.3, 2.0);
+}
