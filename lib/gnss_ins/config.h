@@ -71,10 +71,10 @@ struct AidingConfig {
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
   double start_std = 0.1;           ///< m/s, before anything is learnt
-  double min_std = 0.003;           ///< m/s
+  double min_std = 0.001;           ///< m/s, so that it can grow again
   double max_std = 0.5;             ///< m/s
   double start_slope = 0.03;        ///< s: m/s per m/s2 of acceleration, likewise (rear slip angle at 10 m/s)
-  double prior_count = 1.0;         ///< residuals that the start counts for
+  double prior_count = 0.2;         ///< residuals that the start counts for
   double heave_prior_count = 20.0;  ///< likewise, for the vertical axis
   double memory_count = 400.0;      ///< residuals
   double confidence = 3.0;          ///< sigmas of the learnt variance that are added to it
@@ -164,7 +164,7 @@ void visit(SideslipConfig& c, Visitor& v) {
   v.number("min_std_mps", c.min_std, 1e-4, 10.0);
   v.number("max_std_mps", c.max_std, 1e-3, 10.0);
   v.number("start_slope_s", c.start_slope, 1e-3, 10.0);
-  v.number("prior_count", c.prior_count, 1.0, 1e6);
+  v.number("prior_count", c.prior_count, 0.01, 1e6);
   v.number("heave_prior_count", c.heave_prior_count, 1.0, 1e6);
   v.number("memory_count", c.memory_count, 1.0, 1e6);
   v.number("confidence", c.confidence, 0.0, 100.0);
