@@ -27,6 +27,11 @@ inline F8 load(const float* from) {
   std::memcpy(&x, from, sizeof x);
   return x;
 }
+inline U8 load(const std::uint32_t* from) {
+  U8 x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
 /// The first `count` lanes.
 template <class Element, class Lanes>
 void store(Element* to, const Lanes& x, int count) {

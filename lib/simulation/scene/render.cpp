@@ -156,13 +156,18 @@ void Renderer::first_pass(const Frame& frame, int band, LightField& out) const {
 }
 
 void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
+  const auto surface = [&](int x, int y) { return &out.surface[static_cast<std::size_t>(y * width_ + x)]; };
   const auto on_edge = [&](int x, int y) {
-    const std::uint32_t here = out.surface[static_cast<std::size_t>(y * width_ + x)];
-    const auto differs = [&](int column, int row) {
-      return column >= 0 && column < width_ && row >= 0 && row < height_ &&
-             out.surface[static_cast<std::size_t>(row * width_ + column)] != here;
-    };
-    return differs(x - 1, y) || differs(x + 1, y) || differs(x, y - 1) || differs(x, y + 1);
+    const std::uint32_t here = *surface(x, y);
+    return (x > 0 && *surface(x - 1, y) != here) || (x + 1 < width_ && *surface(x + 1, y) != here) ||
+           (y > 0 && *surface(x, y - 1) != here) || (y + 1 < height_ && *surface(x, y + 1) != here);
+  };
+  // Whether none of the eight pixels from (x, y) on is: a quick look that may say no.
+  const auto smooth = [&](int x, int y) {
+    if (x == 0 || x + kLanes >= width_ || y == 0 || y + 1 == height_) return false;
+    const U8 here = load(surface(x, y));
+    return !any((load(surface(x - 1, y)) != here) | (load(surface(x + 1, y)) != here) |
+                (load(surface(x, y - 1)) != here) | (load(surface(x, y + 1)) != here));
   };
   int x[kLanes];
   int y[kLanes];
@@ -188,10 +193,13 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
   };
   const int end = std::min(height_, (band + 1) * TileGrid::kHeight);
   for (int row = band * TileGrid::kHeight; row < end; ++row) {
-    for (int column = 0; column < width_; ++column) {
-      if (!on_edge(column, row)) continue;
-      for (int i = 4 * pending; i < 4 * pending + 4; ++i) x[i] = column, y[i] = row;
-      if (++pending == 2) flush();
+    for (int first = 0; first < width_; first += kLanes) {
+      if (smooth(first, row)) continue;
+      for (int column = first; column < std::min(width_, first + kLanes); ++column) {
+        if (!on_edge(column, row)) continue;
+        for (int i = 4 * pending; i < 4 * pending + 4; ++i) x[i] = column, y[i] = row;
+        if (++pending == 2) flush();
+      }
     }
   }
   flush();

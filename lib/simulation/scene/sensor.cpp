@@ -38,36 +38,53 @@ std::array<float, kQuantiles> make_quantiles() {
 }
 
 /// Light at fractional coordinates, the picture's edge continued.
-float bilinear(const LightField& light, float u, float v) {
-  u = std::clamp(u, 0.0F, static_cast<float>(light.width - 1));
-  v = std::clamp(v, 0.0F, static_cast<float>(light.height - 1));
-  const int x = std::min(static_cast<int>(u), light.width - 2);
-  const int y = std::min(static_cast<int>(v), light.height - 2);
-  const float a = u - static_cast<float>(x);
-  const float b = v - static_cast<float>(y);
-  const float* p = &light.radiance[static_cast<std::size_t>(y * light.width + x)];
-  const float* q = p + light.width;
-  return (1.0F - b) * ((1.0F - a) * p[0] + a * p[1]) + b * ((1.0F - a) * q[0] + a * q[1]);
+F8 bilinear(const LightField& light, F8 u, F8 v) {
+  u = clamp(u, splat(0.0F), splat(static_cast<float>(light.width - 1)));
+  v = clamp(v, splat(0.0F), splat(static_cast<float>(light.height - 1)));
+  const F8 x = to_float(to_int(min(u, splat(static_cast<float>(light.width - 2)))));
+  const F8 y = to_float(to_int(min(v, splat(static_cast<float>(light.height - 2)))));
+  const F8 a = u - x;
+  const F8 b = v - y;
+  const float* const p = light.radiance.data();
+  const float* const q = p + light.width;
+  const I8 at = to_int(y) * light.width + to_int(x);
+  return (1.0F - b) * ((1.0F - a) * look_up(p, at) + a * look_up(p + 1, at)) +
+         b * ((1.0F - a) * look_up(q, at) + a * look_up(q + 1, at));
 }
 
-/// Mean light over the way that the surface takes through the pixel while the shutter is open, centred on its middle.
-float blurred(const LightField& light, int x, int y, float exposure_s) {
+F8 load_some(const std::vector<float>& from, std::size_t at, int count) {
+  if (count == kLanes) return load(&from[at]);
+  F8 x = splat(0.0F);
+  for (int i = 0; i < count; ++i) x[i] = from[at + static_cast<std::size_t>(i)];
+  return x;
+}
+
+/// Mean light over the way that the surface takes through each of `count` pixels while the shutter is open, centred on
+/// its middle.
+F8 blurred(const LightField& light, int x, int y, int count, float exposure_s) {
   const auto at = static_cast<std::size_t>(y * light.width + x);
-  float du = light.flow_u[at] * exposure_s;
-  float dv = light.flow_v[at] * exposure_s;
-  const float length = std::sqrt(du * du + dv * dv);
-  if (length < kShortestBlur_px) return light.radiance[at];
-  if (length > kLongestBlur_px) {
-    du *= kLongestBlur_px / length;
-    dv *= kLongestBlur_px / length;
+  const F8 sharp = load_some(light.radiance, at, count);
+  F8 du = load_some(light.flow_u, at, count) * exposure_s;
+  F8 dv = load_some(light.flow_v, at, count) * exposure_s;
+  const F8 length = root(du * du + dv * dv);
+  const I8 smeared = length >= kShortestBlur_px;
+  if (!any(smeared)) return sharp;
+  const F8 longest = splat(kLongestBlur_px);
+  const F8 shrink = select(length > longest, longest / length, splat(1.0F));
+  du *= shrink;
+  dv *= shrink;
+  const I8 taps = to_int(min(select(smeared, length, splat(0.0F)), longest)) + 2;
+  const F8 u = to_float((I8)(static_cast<std::uint32_t>(x) + kLaneNumbers));
+  const F8 v = splat(static_cast<float>(y));
+  const F8 per_taps = to_float(taps);
+  const auto most = static_cast<int>(largest(per_taps));
+  F8 sum = splat(0.0F);
+  for (int k = 0; k < most; ++k) {
+    const F8 share = (static_cast<float>(k) + 0.5F) / per_taps - 0.5F;
+    const F8 tap = bilinear(light, u + share * du, v + share * dv);
+    sum += select(taps > k, tap, splat(0.0F));
   }
-  const int taps = 2 + static_cast<int>(std::min(length, kLongestBlur_px));
-  float sum = 0.0F;
-  for (int k = 0; k < taps; ++k) {
-    const float share = (static_cast<float>(k) + 0.5F) / static_cast<float>(taps) - 0.5F;
-    sum += bilinear(light, static_cast<float>(x) + share * du, static_cast<float>(y) + share * dv);
-  }
-  return sum / static_cast<float>(taps);
+  return select(smeared, sum / per_taps, sharp);
 }
 
 }  // namespace
@@ -142,8 +159,7 @@ I8 grey_values(const Development& d, F8 radiance, F8 column, std::uint32_t at) {
 void develop_row(const Development& d, const LightField& light, int y, std::uint8_t* out) {
   for (int x = 0; x < light.width; x += kLanes) {
     const int count = std::min(kLanes, light.width - x);
-    F8 radiance = splat(0.0F);
-    for (int i = 0; i < count; ++i) radiance[i] = blurred(light, x + i, y, d.exposure_s);
+    const F8 radiance = blurred(light, x, y, count, d.exposure_s);
     const auto at = static_cast<std::uint32_t>(y * light.width + x);
     const I8 grey = grey_values(d, radiance, to_float((I8)(static_cast<std::uint32_t>(x) + kLaneNumbers)), at);
     for (int i = 0; i < count; ++i) out[x + i] = static_cast<std::uint8_t>(grey[i]);

@@ -11,7 +11,7 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNearest_m = 1e-3F;  // depth before which nothing is seen
 constexpr float kRounding = 4e-6F;   // of products of coordinates in floats, with a margin
-constexpr float kEdge_m = 2e-5F;      // rounding of floats 100 m from their origin, with a margin
+constexpr float kEdge_m = 2e-5F;     // rounding of floats 100 m from their origin, with a margin
 constexpr float kShare = 1e-5F;      // margin of depths
 
 struct Interval {
