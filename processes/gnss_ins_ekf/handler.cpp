@@ -19,6 +19,9 @@ namespace roadfix {
 namespace {
 
 constexpr double kMicrotesla = 1e-6;
+// s, where the calibration says nothing: fixes stamped when they came out of the receiver are 20 to 100 ms old. Nought
+// would claim that they are not, and the delay would pass for a scale or a mounting error.
+constexpr double kUnknownLatency = 0.05;
 
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
@@ -41,7 +44,7 @@ class GnssInsStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
-    spec_.state_layout = 3;
+    spec_.state_layout = 4;
     spec_.clocks = {{kImu, 200'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
@@ -162,6 +165,7 @@ void take(const std::optional<T>& from, T& to) {
 
 GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
   GnssInsVehicle v;
+  v.position_latency_std = v.velocity_latency_std = kUnknownLatency;
   if (const auto& imu = calibration.sensors.imu) {
     take(imu->gyro_noise, v.gyro_noise);
     take(imu->accel_noise, v.accel_noise);
@@ -174,7 +178,8 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
   if (const auto& gnss = calibration.sensors.gnss) {
     take(gnss->lever_arm, v.p_imu_antenna);
     take(gnss->position_latency_std, v.position_latency_std);
-    take(gnss->velocity_latency_std, v.velocity_latency_std);
+    // One receiver, one way through it, unless the calibration knows better.
+    v.velocity_latency_std = gnss->velocity_latency_std.value_or(v.position_latency_std);
   }
   if (const auto& wheels = calibration.sensors.wheels) {
     take(wheels->speed_scale_std, v.wheel_scale_std);
