@@ -89,13 +89,13 @@ ErrorMatrix Transition::dense() const {
 namespace {
 
 using Packet = Eigen::internal::packet_traits<double>::type;  // one vector register
-constexpr int kLanes = Eigen::internal::packet_traits<double>::size;
+constexpr Eigen::Index kLanes = Eigen::internal::packet_traits<double>::size;
 
 /// P Phi', its columns of position, velocity and attitude.
 using Moved = Eigen::Matrix<double, kStates, 9>;
 
 /// P is symmetric, so its columns are its rows: one column of the result at a time, held in registers.
-template <int... Lane>
+template <Eigen::Index... Lane>
 class MovedColumns {
  public:
   MovedColumns(const ErrorMatrix& P, const Transition& phi) : P_(P), phi_(phi) {
@@ -131,14 +131,14 @@ class MovedColumns {
   const Transition& phi_;
 };
 
-template <int... Lane>
-void write_moved(const ErrorMatrix& P, const Transition& phi, Moved& to, std::integer_sequence<int, Lane...>) {
+template <Eigen::Index... Lane>
+void write_moved(const ErrorMatrix& P, const Transition& phi, Moved& to, std::integer_sequence<Eigen::Index, Lane...>) {
   MovedColumns<Lane...>(P, phi).write(to);
 }
 
 Moved moved_columns(const ErrorMatrix& P, const Transition& phi) {
   Moved moved;
-  write_moved(P, phi, moved, std::make_integer_sequence<int, kStates / kLanes>());
+  write_moved(P, phi, moved, std::make_integer_sequence<Eigen::Index, kStates / kLanes>());
   return moved;
 }
 
