@@ -20,8 +20,16 @@ using U8 = std::uint32_t __attribute__((vector_size(32)));
 
 inline F8 splat(float x) { return F8{x, x, x, x, x, x, x, x}; }
 inline U8 splat(std::uint32_t x) { return U8{x, x, x, x, x, x, x, x}; }
-inline F8 select(I8 mask, F8 yes, F8 no) { return mask ? yes : no; }
-inline U8 select(I8 mask, U8 yes, U8 no) { return mask ? yes : no; }
+/// Lanes of a mask are 0 or -1. With AVX one instruction, where the compiler would compare the mask with zero first.
+inline F8 select(I8 mask, F8 yes, F8 no) {
+#ifdef __AVX__
+  return (F8)_mm256_blendv_ps((__m256)no, (__m256)yes, (__m256)mask);
+#else
+  return mask ? yes : no;
+#endif
+}
+inline U8 select(I8 mask, U8 yes, U8 no) { return (U8)select(mask, (F8)yes, (F8)no); }
+inline I8 select(I8 mask, I8 yes, I8 no) { return (I8)select(mask, (F8)yes, (F8)no); }
 inline F8 load(const float* from) {
   F8 x;
   std::memcpy(&x, from, sizeof x);
@@ -71,8 +79,14 @@ inline void transpose(F8 (&x)[kLanes]) {
   }
   for (int i = 0; i < kLanes; ++i) x[i] = y[i];
 }
-inline F8 min(F8 a, F8 b) { return a < b ? a : b; }
-inline F8 max(F8 a, F8 b) { return a > b ? a : b; }
+/// b where neither is smaller (greater), as the processor's own instructions have it.
+#ifdef __AVX__
+inline F8 min(F8 a, F8 b) { return (F8)_mm256_min_ps((__m256)a, (__m256)b); }
+inline F8 max(F8 a, F8 b) { return (F8)_mm256_max_ps((__m256)a, (__m256)b); }
+#else
+inline F8 min(F8 a, F8 b) { return select(a < b, a, b); }
+inline F8 max(F8 a, F8 b) { return select(a > b, a, b); }
+#endif
 inline F8 abs(F8 a) { return max(a, -a); }
 inline F8 clamp(F8 x, F8 lo, F8 hi) { return min(max(x, lo), hi); }
 inline F8 clamp01(F8 x) { return clamp(x, splat(0.0F), splat(1.0F)); }

@@ -231,7 +231,7 @@ void TileLists::search(int row, int column, const Lanes3& direction, Nearest& ne
     hit.u = select(nearer, second ? 1.0F - u : u, hit.u);
     hit.v = select(nearer, second ? 1.0F - v : v, hit.v);
     hit.distance = select(nearer, distance, hit.distance);
-    hit.face = nearer ? I8{} + triangle : hit.face;
+    hit.face = select(nearer, I8{} + triangle, hit.face);
     farthest = largest(hit.distance) * (1.0F + kShare);
   }
 }
