@@ -101,7 +101,7 @@ class Rasteriser {
 };
 
 std::vector<float> cast(RayScene& scene, const CameraIntrinsics& lens, const View& view) {
-  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s);
+  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s, RayUse::kPoints);
   const Eigen::Vector3f eye = (view.T_enu_camera.p - window.origin()).cast<float>();
   const Eigen::Matrix3f R = view.T_enu_camera.R().cast<float>();
   std::vector<float> out(static_cast<std::size_t>(lens.width * lens.height));

@@ -5,15 +5,16 @@
 
 #include "simulation/scenarios.h"
 #include "simulation/scene/film.h"
+#include "simulation/scene/tracks.h"
 #include "stream/thread_pool.h"
 
 namespace roadfix {
 namespace {
 
-SimulatedDrive stereo_drive(const char* name) {
+SimulatedDrive stereo_drive(const char* name, double rate_hz = 2.0) {
   ScenarioConfig config = scenario(name);
   config.camera.layout = CameraLayout::kStereo;
-  config.camera.rate_hz = 2.0;  // more places in few pictures
+  config.camera.rate_hz = rate_hz;  // 2: more places in few pictures
   return simulate(config, 1);
 }
 
@@ -56,6 +57,22 @@ void develop(benchmark::State& state, double exposure_s) {
 }
 BENCHMARK_CAPTURE(develop, day, 5e-4)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(develop, tunnel, 8e-3)->Unit(benchmark::kMillisecond);
+
+/// The same drive as points without pixels, both eyes: to hold against stereo_pair.
+void tracks(benchmark::State& state) {
+  const SimulatedDrive drive = stereo_drive("city_loop", 10.0);
+  const SimulatedRig rig = rig_of(drive);
+  const World world = world_of(drive);
+  TrackSimulator simulator(world, {}, rig.camera,
+                           TrackSimulator::RightCamera{rig.camera, rig.T_vehicle_left.inverse() * rig.T_vehicle_right},
+                           1);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    const std::int64_t t_us = drive.exposures[next++ % drive.exposures.size()];
+    benchmark::DoNotOptimize(simulator.observe(view_at(drive, rig.T_vehicle_left, t_us)).data());
+  }
+}
+BENCHMARK(tracks)->Unit(benchmark::kMillisecond);
 
 void make_world(benchmark::State& state) {
   const SimulatedDrive drive = stereo_drive("city_loop");

@@ -8,6 +8,7 @@
 #include <limits>
 #include <list>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <tuple>
@@ -130,8 +131,8 @@ struct RayWindow::Impl {
   QuadScene still;
   QuadScene moving;
   Float3 to_sun{};
-  SunGrid still_shadows;
-  SunGrid moving_shadows;
+  std::optional<SunGrid> still_shadows;  // made when pictures ask for them
+  std::optional<SunGrid> moving_shadows;
 
   void add(const FaceShade& shade, const std::array<Float3, 4>& corner) {
     faces.push_back(shade);
@@ -140,9 +141,10 @@ struct RayWindow::Impl {
     triangles.insert(triangles.end(), halves.begin(), halves.end());
   }
   [[nodiscard]] I8 occluded(const RayLanes& rays, I8 active, float reach) const;
-  /// Of the faces from `first` on.
-  [[nodiscard]] SunGrid shadows(std::size_t first, double cell_m) const {
-    return {to_sun, {triangles.begin() + static_cast<std::ptrdiff_t>(2 * first), triangles.end()}, cell_m};
+  /// Of the faces [first, last).
+  [[nodiscard]] SunGrid shadows(std::size_t first, std::size_t last, double cell_m) const {
+    const auto at = [this](std::size_t face) { return triangles.begin() + static_cast<std::ptrdiff_t>(2 * face); };
+    return {to_sun, {at(first), at(last)}, cell_m};
   }
 };
 
@@ -154,8 +156,8 @@ const std::vector<std::array<Float3, 4>>& RayWindow::corners() const { return im
 const std::vector<Triangle>& RayWindow::triangles() const { return impl_->triangles; }
 
 I8 RayWindow::shaded(const Lanes3& point, I8 active, float reach_m) const {
-  const SunGrid::Shade still = impl_->still_shadows.shaded(point, active, reach_m);
-  const SunGrid::Shade moving = impl_->moving_shadows.shaded(point, active & ~still.dark, reach_m);
+  const SunGrid::Shade still = impl_->still_shadows->shaded(point, active, reach_m);
+  const SunGrid::Shade moving = impl_->moving_shadows->shaded(point, active & ~still.dark, reach_m);
   const I8 dark = still.dark | moving.dark;
   const I8 doubtful = (still.doubtful | moving.doubtful) & ~dark;
   return any(doubtful) ? impl_->occluded({point, splat(impl_->to_sun)}, active, reach_m) : dark;
@@ -248,7 +250,6 @@ struct RayScene::Impl {
     }
     impl->num_static = impl->faces.size();
     impl->still = QuadScene(device, impl->corners);
-    impl->still_shadows = impl->shadows(0, kStillCell_m);
     return std::make_unique<RayWindow>(std::move(impl));
   }
 
@@ -270,7 +271,13 @@ struct RayScene::Impl {
       }
     }
     window.moving = QuadScene(device, std::span(window.corners).subspan(window.num_static));
-    window.moving_shadows = window.shadows(window.num_static, kMovingCell_m);
+    window.moving_shadows.reset();
+  }
+
+  static void place_shadows(RayWindow::Impl& window) {
+    if (!window.still_shadows) window.still_shadows = window.shadows(0, window.num_static, kStillCell_m);
+    if (!window.moving_shadows)
+      window.moving_shadows = window.shadows(window.num_static, window.faces.size(), kMovingCell_m);
   }
 };
 
@@ -281,7 +288,7 @@ RayScene::RayScene(const World& world) : impl_(std::make_unique<Impl>()) {
 }
 RayScene::~RayScene() = default;
 
-const RayWindow& RayScene::prepare(const Eigen::Vector3d& p_enu_camera, double t_s) {
+const RayWindow& RayScene::prepare(const Eigen::Vector3d& p_enu_camera, double t_s, RayUse use) {
   const Eigen::Vector3d at = p_enu_camera / kWindowGrid_m;
   const std::tuple<int, int, int> cell{static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())),
                                        static_cast<int>(std::lround(at.z()))};
@@ -294,6 +301,7 @@ const RayWindow& RayScene::prepare(const Eigen::Vector3d& p_enu_camera, double t
     windows.splice(windows.begin(), windows, found);
   }
   impl_->place_movers(*windows.front()->impl_, t_s);
+  if (use == RayUse::kPictures) Impl::place_shadows(*windows.front()->impl_);
   return *windows.front();
 }
 

@@ -46,6 +46,9 @@ struct HitLanes {
 
 class RayWindow;  // one window's Embree scenes
 
+/// What a window is made ready for: the grids towards the sun take as long as all the rest.
+enum class RayUse { kPoints, kPictures };
+
 class RayScene {
  public:
   explicit RayScene(const World& world);
@@ -55,7 +58,7 @@ class RayScene {
 
   /// Makes the window around a camera and puts the moving cars where they are at t_s. Not thread safe; what it returns
   /// is, and stays valid until the next call.
-  const RayWindow& prepare(const Eigen::Vector3d& p_enu_camera, double t_s);
+  const RayWindow& prepare(const Eigen::Vector3d& p_enu_camera, double t_s, RayUse use);
 
  private:
   struct Impl;
@@ -72,7 +75,8 @@ class RayWindow {
   [[nodiscard]] const std::vector<FaceShade>& faces() const;  ///< static ones first, then those of moving cars
   [[nodiscard]] const std::vector<std::array<Float3, 4>>& corners() const;  ///< of the faces
   [[nodiscard]] const std::vector<Triangle>& triangles() const;             ///< two a face
-  /// -1 where something lies between a point and `reach_m` further towards the sun; lanes not `active` give 0.
+  /// -1 where something lies between a point and `reach_m` further towards the sun; lanes not `active` give 0. Only in
+  /// a window for pictures.
   [[nodiscard]] I8 shaded(const Lanes3& point, I8 active, float reach_m) const;
   [[nodiscard]] HitLanes intersect(const RayLanes& rays) const;
   [[nodiscard]] bool occluded(const Eigen::Vector3d& from_enu, const Eigen::Vector3d& to_enu) const;

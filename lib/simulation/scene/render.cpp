@@ -206,7 +206,7 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
 }
 
 void Renderer::render(RayScene& scene, const View& view, Executor& executor, LightField& out) const {
-  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s);
+  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s, RayUse::kPictures);
   const Eigen::Matrix3d R = view.T_enu_camera.R();
   const Eigen::Vector3f eye = (view.T_enu_camera.p - window.origin()).cast<float>();
   TileLists lists(tiles_, window, R.cast<float>(), eye);

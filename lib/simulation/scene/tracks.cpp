@@ -217,7 +217,7 @@ TrackSimulator::~TrackSimulator() = default;
 
 std::vector<TrackObservation> TrackSimulator::observe(const View& view) {
   Impl& s = *impl_;
-  const RayWindow& window = s.scene.prepare(view.T_enu_camera.p, view.t_s);
+  const RayWindow& window = s.scene.prepare(view.T_enu_camera.p, view.t_s, RayUse::kPoints);
   Impl::Buckets buckets(s.left.intrinsics(), s.config.wanted);
   std::vector<TrackObservation> out;
   std::vector<Track> alive;

@@ -43,7 +43,7 @@ Comparison compare(const StreetPlan& plan, const View& view, float told = 0.0F) 
   const Camera camera(test::lens(kWidth, kHeight));
   const World world = build_world(plan);
   RayScene scene(world);
-  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s);
+  const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s, RayUse::kPoints);
   const Rays rays(camera);
   const TileGrid grid(kWidth, kHeight, rays.x, rays.y);
   const Eigen::Matrix3f R = view.T_enu_camera.R().cast<float>();
@@ -100,7 +100,7 @@ TEST_CASE("points above a street lie in the shade exactly where Embree finds som
   int points = 0;
   for (std::size_t place = 100; place < 600; place += 2) {
     const Eigen::Vector3d& middle = plan.driven[place];
-    const RayWindow& window = scene.prepare(middle, 3.0);
+    const RayWindow& window = scene.prepare(middle, 3.0, RayUse::kPictures);
     Eigen::Vector3d p[kLanes];
     Lanes3 lanes{};
     for (int i = 0; i < kLanes; ++i) {
