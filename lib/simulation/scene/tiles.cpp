@@ -35,7 +35,7 @@ float lowest(const Float3& f, const TileGrid::Bounds& t) {
 
 TileGrid::TileGrid(int width, int height, const std::vector<float>& ray_x, const std::vector<float>& ray_y)
     : columns_((width + kWidth - 1) / kWidth), rows_((height + kHeight - 1) / kHeight) {
-  const auto stride = static_cast<std::size_t>(width + 2);
+  const auto stride = static_cast<std::size_t>(width) + 2;
   const Bounds none{kInfinity, -kInfinity, kInfinity, -kInfinity};
   const auto widen = [](Bounds& b, const Bounds& by) {
     b = {std::min(b.x0, by.x0), std::max(b.x1, by.x1), std::min(b.y0, by.y0), std::max(b.y1, by.y1)};

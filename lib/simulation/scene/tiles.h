@@ -27,7 +27,8 @@ class TileGrid {
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] const Bounds& operator()(int column, int row) const {
-    return tiles_[static_cast<std::size_t>(row * columns_ + column)];
+    return tiles_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                  static_cast<std::size_t>(column)];
   }
   [[nodiscard]] const Bounds& picture() const { return picture_; }
   struct Range {
