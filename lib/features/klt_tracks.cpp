@@ -65,6 +65,7 @@ std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Featu
   num_expected_ = static_cast<int>(live_.size());
   const bool same_size = !pyramid_.empty() && pyramid_.picture().size() == gray.size();
   std::vector<Track> still;
+  still.reserve(live_.size());
   auto hint = hints.begin();
   for (const Track& track : live_) {
     if (!same_size) break;

@@ -1,7 +1,9 @@
 #include "features/patch.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 namespace roadfix {
 namespace {
@@ -43,8 +45,8 @@ float sum_of(const Pixels& a, int n) {
 template <int N>
 struct Model {
   int side = 0, count = 0, padded = 0;
-  Pixels value{};
-  std::array<Pixels, N> slope{};
+  Pixels value;
+  std::array<Pixels, N> slope;
   float energy = 0.0F;
   Square<N> inverse;  ///< of Gauss-Newton's matrix with the prior
 };
@@ -61,6 +63,9 @@ bool prepare(const Patch& patch, int side, float prior, Model<N>& m) {
   m.side = side;
   m.count = side * side;
   m.padded = (m.count + kLanes - 1) / kLanes * kLanes;
+  const auto blank = [&m](Pixels& pixels) { std::fill(pixels.begin() + m.count, pixels.begin() + m.padded, 0.0F); };
+  blank(m.value);
+  for (Pixels& slope : m.slope) blank(slope);
   const int stride = side + 2, half = side / 2;
   const float edge = 1.0F / static_cast<float>(std::max(1, half));
   size_t i = 0;
@@ -104,49 +109,52 @@ bool prepare(const Patch& patch, int side, float prior, Model<N>& m) {
          kGreyNoise * kGreyNoise * widest < kMaxPlaceStd_px * kMaxPlaceStd_px;
 }
 
-/// Grey levels where the placement puts the patch's pixels; false where one lies outside the picture.
-bool sample(const cv::Mat& gray, const Placement& place, int side, bool upright, Pixels& out) {
-  const auto half = static_cast<float>(side / 2);
-  const float reach_u = (std::abs(place.shape(0, 0)) + std::abs(place.shape(0, 1))) * half;
-  const float reach_v = (std::abs(place.shape(1, 0)) + std::abs(place.shape(1, 1))) * half;
-  const float u0 = place.centre.x(), v0 = place.centre.y();
-  if (!(u0 - reach_u >= 0.0F && v0 - reach_v >= 0.0F && u0 + reach_u < static_cast<float>(gray.cols - 1) &&
-        v0 + reach_v < static_cast<float>(gray.rows - 1))) {
+/// Offsets of a patch's pixels from its centre.
+struct Grid {
+  explicit Grid(int side) : count(static_cast<size_t>(side) * static_cast<size_t>(side)) {
+    const int half = side / 2;
+    for (int i = 0; i < side * side; ++i) {
+      x[static_cast<size_t>(i)] = static_cast<float>(i % side - half);
+      y[static_cast<size_t>(i)] = static_cast<float>(i / side - half);
+    }
+  }
+  size_t count;
+  Pixels x, y;
+};
+
+/// Grey levels where the placement puts the patch's pixels; false where one lies outside the picture. In three passes,
+/// so that all but the loads themselves run in vector registers.
+bool sample(const cv::Mat& gray, const Placement& place, int side, const Grid& grid, Pixels& out) {
+  constexpr float kEdge = 0.01F;  // px, for rounding
+  const Eigen::Vector2f reach = place.shape.cwiseAbs().rowwise().sum() * static_cast<float>(side / 2);
+  const Eigen::Vector2f low = place.centre - reach, high = place.centre + reach;
+  if (!(low.x() >= kEdge && low.y() >= kEdge && high.x() < static_cast<float>(gray.cols - 1) - kEdge &&
+        high.y() < static_cast<float>(gray.rows - 1) - kEdge)) {
     return false;
   }
-  size_t i = 0;
-  if (upright) {  // every pixel lies alike between its neighbours
-    const float left = u0 - half, top = v0 - half;
-    const auto column = static_cast<int>(left), row = static_cast<int>(top);
-    const float a = left - static_cast<float>(column), b = top - static_cast<float>(row);
-    const float w00 = (1 - a) * (1 - b), w01 = a * (1 - b), w10 = (1 - a) * b, w11 = a * b;
-    for (int r = 0; r < side; ++r) {
-      const uint8_t* p = gray.ptr<uint8_t>(row + r) + column;
-      const uint8_t* q = gray.ptr<uint8_t>(row + r + 1) + column;
-      float* to = out.data() + i;
-      for (int c = 0; c < side; ++c) {
-        to[c] = w00 * static_cast<float>(p[c]) + w01 * static_cast<float>(p[c + 1]) + w10 * static_cast<float>(q[c]) +
-                w11 * static_cast<float>(q[c + 1]);
-      }
-      i += static_cast<size_t>(side);
-    }
-    return true;
+  std::array<int32_t, kMaxPixels> where;
+  Pixels a, b;
+  std::array<uint16_t, kMaxPixels> upper, lower;  // two neighbours, the left one's byte is the low one (x86-64, ARM64)
+  const float u0 = place.centre.x(), uu = place.shape(0, 0), uv = place.shape(0, 1);
+  const float v0 = place.centre.y(), vu = place.shape(1, 0), vv = place.shape(1, 1);
+  const auto step = static_cast<int32_t>(gray.step[0]);
+  for (size_t k = 0; k < grid.count; ++k) {
+    const float u = u0 + uu * grid.x[k] + uv * grid.y[k], v = v0 + vu * grid.x[k] + vv * grid.y[k];
+    const auto column = static_cast<int32_t>(u), row = static_cast<int32_t>(v);
+    a[k] = u - static_cast<float>(column);
+    b[k] = v - static_cast<float>(row);
+    where[k] = row * step + column;
   }
-  const float su = place.shape(0, 0), sv = place.shape(1, 0);
-  for (int r = 0; r < side; ++r) {
-    const float y = static_cast<float>(r) - half;
-    const float u_row = u0 + place.shape(0, 1) * y - su * half, v_row = v0 + place.shape(1, 1) * y - sv * half;
-    for (int c = 0; c < side; ++c, ++i) {
-      const float u = std::max(0.0F, u_row + su * static_cast<float>(c));  // rounding may pass the edge
-      const float v = std::max(0.0F, v_row + sv * static_cast<float>(c));
-      const auto column = static_cast<int>(u), row = static_cast<int>(v);
-      const float a = u - static_cast<float>(column), b = v - static_cast<float>(row);
-      const uint8_t* p = gray.ptr<uint8_t>(row) + column;
-      const uint8_t* q = p + gray.step[0];
-      const float above = static_cast<float>(p[0]) + a * static_cast<float>(p[1] - p[0]);
-      const float below = static_cast<float>(q[0]) + a * static_cast<float>(q[1] - q[0]);
-      out[i] = above + b * (below - above);
-    }
+  const uint8_t* first = gray.data;
+  for (size_t k = 0; k < grid.count; ++k) {
+    std::memcpy(&upper[k], first + where[k], 2);
+    std::memcpy(&lower[k], first + where[k] + step, 2);
+  }
+  for (size_t k = 0; k < grid.count; ++k) {
+    const auto p0 = static_cast<float>(upper[k] & 0xFF), p1 = static_cast<float>(upper[k] >> 8);
+    const auto q0 = static_cast<float>(lower[k] & 0xFF), q1 = static_cast<float>(lower[k] >> 8);
+    const float above = p0 + a[k] * (p1 - p0), below = q0 + a[k] * (q1 - q0);
+    out[k] = above + b[k] * (below - above);
   }
   return true;
 }
@@ -160,12 +168,13 @@ std::optional<Placement> place(const Patch& patch, const cv::Mat& gray, const Pl
   const float prior = N == 6 ? kGreyNoise * kGreyNoise / (edge_std * edge_std) : 0.0F;
   Model<N> m;
   if (!prepare(patch, side, prior, m)) return std::nullopt;
-  const bool upright = N == 2 && start.shape.isIdentity(0.0F);
+  const Grid grid(side);
   const Eigen::Matrix2f start_inverse = start.shape.inverse();
   Placement now = start;
-  Pixels seen{};
+  Pixels seen;
+  std::fill(seen.begin() + m.count, seen.begin() + m.padded, 0.0F);
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    if (!sample(gray, now, side, upright, seen)) return std::nullopt;
+    if (!sample(gray, now, side, grid, seen)) return std::nullopt;
     const float mean = sum_of(seen, m.padded) / static_cast<float>(m.count);
     const float spread = dot(seen, seen, m.padded) - mean * mean * static_cast<float>(m.count);
     const float gain = std::sqrt(spread / m.energy);  // also where the patches do not match yet

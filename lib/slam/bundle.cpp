@@ -69,7 +69,7 @@ double cost_of(const BundleProblem& problem, std::vector<double>* error_px = nul
 /// (M.9)
 NormalEquations linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free,
                           Purpose purpose = Purpose::kStep) {
-  NormalEquations equations(num_free, problem.points.size());
+  NormalEquations equations(num_free, problem.points.size(), problem.observations.size());
   const Eyes eyes(problem);
   const double scale = problem.focal_px / problem.sigma_px;
   ReprojectionJacobian J;

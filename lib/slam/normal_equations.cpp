@@ -8,12 +8,14 @@ constexpr double kMinPointInformation = 1e-9;  ///< keeps a point without parall
 
 }  // namespace
 
-NormalEquations::NormalEquations(int num_free_views, size_t num_points)
+NormalEquations::NormalEquations(int num_free_views, size_t num_points, size_t num_observations)
     : lens_row_(6 * num_free_views),
       H_(Eigen::MatrixXd::Zero(lens_row_ + kLens, lens_row_ + kLens)),
       b_(Eigen::VectorXd::Zero(lens_row_ + kLens)),
       H_known_(H_),
-      points_(num_points) {}
+      points_(num_points) {
+  links_.reserve(num_observations);
+}
 
 void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual,
                           Weight weight) {

@@ -12,7 +12,8 @@ namespace roadfix {
 /// Unknowns: six for each free view, then the lens correction, then three for each point.
 class NormalEquations {
  public:
-  NormalEquations(int num_free_views, size_t num_points);
+  /// `num_observations`: as many as will be added, at most.
+  NormalEquations(int num_free_views, size_t num_points, size_t num_observations = 0);
 
   /// How much one observation counts: by the slope of its robust cost in b, by its curvature in H.
   struct Weight {
