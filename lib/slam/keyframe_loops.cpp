@@ -1,4 +1,6 @@
 /// The tracker's places: remembered at keyframes, known again, and where to begin after a loss.
+#include <cmath>
+
 #include "features/corners.h"
 #include "features/keypoints.h"
 #include "geometry/so3.h"
@@ -9,6 +11,14 @@ namespace {
 
 constexpr int64_t kPlaceEvery = 3;  ///< keyframes
 constexpr int kExtraCorners = 300;  ///< beside the tracks: another visit may have followed others
+
+/// Can a vehicle last seen `away` metres from there, driving at `speed`, be there after `unseen_s`? Streets repeat
+/// themselves, and a place that looks right and fits in itself may be another one.
+bool within_reach(double away, double speed, double unseen_s, double sigma) {
+  constexpr double kAcceleration = 5.0;  // m/s2, more than a car gains in traffic
+  constexpr double kSigmas = 4.0;
+  return away <= speed * unseen_s + 0.5 * kAcceleration * unseen_s * unseen_s + kSigmas * sigma;
+}
 
 }  // namespace
 
@@ -59,6 +69,10 @@ void KeyframeTracker::find_back(const CameraFrame& frame) {
   if (!config_.close_loops || !t_good_us_ || loops_.num_places() == 0) return;
   const auto found = loops_.locate(view_of(frame.left, {}, frame.t_us));
   if (!found) return;
+  const double speed = motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s : 0.0;
+  const double sigma = std::sqrt(cov_closed_.topLeftCorner<3, 3>().trace());
+  const double unseen_s = seconds_between(*t_good_us_, frame.t_us);
+  if (!within_reach((found->p - T_map_camera_.p).norm(), speed, unseen_s, sigma)) return;
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
   const SE3 was = T_map_camera_ * T_camera_vehicle, is = *found * T_camera_vehicle;
   found_back_ = true;

@@ -107,6 +107,30 @@ TEST_CASE("mono follows the drive up to scale, and to scale where the wheels tel
   }
 }
 
+/// After so many frames and a second of darkness the first picture comes again.
+TrackedFrame after_darkness(int frames) {
+  Run run(true);
+  for (int i = 0; i < frames; ++i) run.tracker.process(drive()[static_cast<size_t>(i)]);
+  for (int i = frames; i < frames + 10; ++i) {
+    run.tracker.process({100'000 * (i + 1), cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1), {}});
+  }
+  CHECK(run.tracker.last().state == TrackState::kLost);
+  CameraFrame frame = drive()[0];
+  frame.t_us = 100'000 * (frames + 11);
+  return run.tracker.process(frame);
+}
+
+TEST_CASE("after a loss a known place is taken where the vehicle can have come to it, and only there") {
+  const TrackedFrame near = after_darkness(6);
+  CHECK(near.state == TrackState::kRelocalised);
+  CHECK(near.reset_counter == 1);
+  CHECK(near.odometry.T_frame_vehicle.p.norm() < 0.1);
+  const TrackedFrame far = after_darkness(25);  // 19 m from there, with 12 m within reach
+  CHECK(far.state == TrackState::kGood);
+  CHECK(far.reset_counter == 1);
+  CHECK((far.odometry.T_frame_vehicle.p - true_pose(24).p).norm() < 6.0);  // begun anew where it was lost
+}
+
 TEST_CASE("bad pictures are survived and called by name") {
   Run run(true);
   const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1), white = black + 255;
