@@ -97,7 +97,8 @@ GnssInsOutput GnssIns::output() {
   T.p = x.position + o * (x.velocity + 0.5 * o * m.acceleration);
   T.q = normalized_positive(x.q_enu_imu * exp_q(o * m.rate));
   out.odometry.velocity = T.q.conjugate() * v;
-  out.odometry.angular_rate = m.rate;
+  // Of the newest sample: m.rate is smoothed for lever arms, and in a turn it is tenths of a second late.
+  out.odometry.angular_rate = forward_->last_step().rate - T.q.conjugate() * forward_->earth().rate();
   if (cov_at_us_ == 0 || seconds_between(cov_at_us_, x.t_us) >= kCovarianceAge) {
     const OutputCovariance cov(x, m, forward_->output_covariance());
     cov_pose_ = cov.pose;
