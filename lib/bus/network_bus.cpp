@@ -12,8 +12,9 @@ namespace {
 
 /// Messages drained before the first of them is handled; the rest stays in LCM's queue, which has no bound.
 constexpr int kDrainAtOnce = 1000;
-/// Messages handled before the caller gets its turn (heartbeats), however many wait.
+/// Messages and time handled before the caller gets its turn (heartbeats, the watchdog), however many wait.
 constexpr int kHandleAtOnce = 1000;
+constexpr auto kHandleFor = std::chrono::milliseconds(100);
 constexpr std::size_t kMaxFreeBuffers = 256;
 
 std::string with_receive_buffer(const std::string& url) {
@@ -106,7 +107,8 @@ void NetworkBus::drain() {
 
 bool NetworkBus::handle(std::chrono::milliseconds patience) {
   if (queue_.empty()) lcm_->handleTimeout(static_cast<int>(patience.count()));
-  for (int i = 0; i < kHandleAtOnce && !queue_.empty(); ++i) {
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < kHandleAtOnce && !queue_.empty() && std::chrono::steady_clock::now() - begin < kHandleFor; ++i) {
     Waiting message = std::move(queue_.front());
     queue_.pop_front();
     --message.subscription->status.depth;

@@ -186,6 +186,10 @@ void ChannelWatch::judge_rate(int64_t now_us, std::vector<Condition>& out) const
     out.push_back(condition("slow", Verdict::kDegraded,
                             fmt::format("comes {} instead of {:.3g}", per_second(rate), *expected_hz_)));
   }
+  if (judged_ && configured_ && window_.size() >= kLeastMessages && rate > limits_.fast_factor * *expected_hz_) {
+    out.push_back(condition("fast", Verdict::kDegraded,
+                            fmt::format("comes {} instead of {:.3g}", per_second(rate), *expected_hz_)));
+  }
   const int64_t lost = lost_.within(now_us);
   const double of = std::max(1.0, expected_hz_.value_or(rate));
   if (judged_ && static_cast<double>(lost) > limits_.lost_share * of) {

@@ -18,6 +18,7 @@ struct ChannelLimits {
   double silent_periods = 2.5;   ///< of the expected rate; a slow channel: silent_at_least after it was due
   double silent_at_least = 0.3;  ///< s; a shorter gap is no silence, however fast the channel
   double slow_share = 0.7;       ///< of the expected rate
+  double fast_factor = 2.0;      ///< of the configured rate
   double lost_share = 0.05;      ///< of the messages of one second
   double latency = 0.25;         ///< s after the stamp; no shipped stage waits longer (DESIGN.md, section 4)
   double ahead = 0.1;            ///< s before the stamp
@@ -87,6 +88,7 @@ void visit(ChannelLimits& c, Visitor& v) {
   v.number("silent_periods", c.silent_periods, 1.1, 100.0);
   v.number("silent_at_least_s", c.silent_at_least, 0.01, 60.0);
   v.number("slow_share", c.slow_share, 0.0, 1.0);
+  v.number("fast_factor", c.fast_factor, 1.1, 1e6);
   v.number("lost_share", c.lost_share, 0.0, 1.0);
   v.number("latency_s", c.latency, 0.001, 60.0);
   v.number("ahead_s", c.ahead, 0.001, 60.0);

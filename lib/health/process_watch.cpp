@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kMebi = 1024.0 * 1024.0;
 constexpr std::size_t kIntervals = 5;
+constexpr double kLived = 2.0;    // s of heartbeats, after which an unexpected process is missed, too
 constexpr double kBeats = 2.5;    // intervals without a sign of life
 constexpr double kAtLeast = 0.5;  // s, however fast it beats
 
@@ -29,6 +30,7 @@ void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
     intervals_us_.push_back(now_us - now_us_);
     if (intervals_us_.size() > kIntervals) intervals_us_.pop_front();
   }
+  if (!newest_ || newest_->run != facts.run) first_us_ = now_us;
   newest_ = facts;
   now_us_ = now_us;
 }
@@ -40,9 +42,9 @@ double ProcessWatch::silent_after() const {
   return std::clamp(kBeats * longest, std::min(kAtLeast, limits_.heartbeat), limits_.heartbeat);
 }
 
-/// One heartbeat of a process that nobody expects may be forged, or of a test: it is not missed.
+/// A few heartbeats of a process that nobody expects may be forged, or of a test: it is not missed.
 bool ProcessWatch::silent(int64_t now_us) const {
-  return newest_ && (expected_ || intervals_us_.size() >= 2) && seconds(now_us - now_us_) > silent_after();
+  return newest_ && (expected_ || seconds(now_us_ - first_us_) > kLived) && seconds(now_us - now_us_) > silent_after();
 }
 
 Condition ProcessWatch::condition(const std::string& what, const std::string& text) const {

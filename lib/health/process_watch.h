@@ -55,6 +55,7 @@ class ProcessWatch {
   ProcessLimits limits_;
   bool expected_;
   std::optional<HeartbeatFacts> newest_;
+  int64_t first_us_ = 0;  ///< of this run
   int64_t now_us_ = 0;
   std::deque<int64_t> intervals_us_;  ///< between the last few heartbeats
   int restarts_ = 0;

@@ -198,7 +198,7 @@ TEST_CASE("a process that beats fast is missed soon, a slow one later; a restart
 TEST_CASE("what spoke only once, as a forger does, is not missed for good; what is expected is") {
   for (const bool expected : {false, true}) {
     ProcessWatch watch("vo_tracker", ProcessLimits{}, expected);
-    watch.heartbeat(test::at(0.0), {});
+    for (const double t : {0.0, 0.01, 0.02, 0.03}) watch.heartbeat(test::at(t), {});
     std::vector<Condition> conditions;
     watch.judge(test::at(20.0), 0, conditions);
     CHECK(conditions.size() == (expected ? 1 : 0));
