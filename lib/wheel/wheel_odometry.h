@@ -57,6 +57,11 @@ class WheelOdometry {
   WheelInputStatus add(const WheelSample& wheels);
   WheelInputStatus add(const MagSample& mag);
 
+  /// Carries it on to `t_us` without a sample, for an output whose newest samples were refused.
+  void carry_to(int64_t t_us) {
+    if (started_ && t_us > t_us_) step_blind(t_us, 0.0);
+  }
+
   /// Nothing before the gyro's bias is known twice as well as the calibration tells it.
   [[nodiscard]] std::optional<WheelMemory> memory() const;
   /// Begins the next start with what was known when the engine was stopped. Once started, it changes nothing.

@@ -80,6 +80,7 @@ class WheelOdometryStage final : public Stage {
     if (!slot_.due(now_utime)) return;
     WheelOdometry now = odometry_;
     for (const Ahead& a : ahead_) add(now, a.sample);
+    now.carry_to(now_utime);
     const WheelReport report = now.report();
     pose_t pose{};
     fill_pose(now.odometry(), pose);
