@@ -1,4 +1,5 @@
-"""operation: what it costs to look, and how soon there is something to see. The rows on latency and soak are measured elsewhere."""
+"""operation: what it costs to look, how soon there is something to see, how fast the live stack is, and whether it grows."""
+import json
 import os
 import re
 import socket
@@ -122,4 +123,48 @@ def first_paint_ms(runs):
         return statistics.median(paints)
 
 
-MEASUREMENTS = {"dashboard_cpu_pct": dashboard_cpu_pct, "first_paint_ms": first_paint_ms}
+LIVE_S = 80
+SOAK_S, SOAK_SPEED = 3600, 4  # an hour of data, as fast as a tracker beside everything else keeps up with on one core
+
+
+def live_stack(runs, name, speed, seconds):
+    """What live_stack.py measures."""
+    def run():
+        script = runs.root / "scripts/figures.d/live_stack.py"
+        result = json.loads(runs.call("unshare", "-n", sys.executable, "-B", script, runs.root, runs.work / name, speed, seconds))
+        if result["deaths"]:
+            raise Skipped("died: " + "; ".join(result["deaths"]))
+        return result
+
+    return runs.once(("live", name), run)
+
+
+def imu_to_ins_p50_us(runs):
+    return live_stack(runs, "live", 1, LIVE_S)["imu_to_ins_p50_us"]
+
+
+def camera_to_fused_p99_ms(runs):
+    result = live_stack(runs, "live", 1, LIVE_S)
+    print(f"figures: {result['pictures']} pictures, median {result['camera_to_fused_p50_ms']:.0f} ms", file=sys.stderr)
+    return result["camera_to_fused_p99_ms"]
+
+
+def soak_rss_growth_pct(runs):
+    """Of the process that grows most: median of the last ten minutes of data against the ten minutes after the first half hour."""
+    result = live_stack(runs, "soak", SOAK_SPEED, SOAK_S)
+    growth = {}
+    for name in result["memory"][-1][1]:
+        early = [memory[name] for at, memory in result["memory"] if SOAK_S / 2 <= at < SOAK_S / 2 + 600 and name in memory]
+        late = [memory[name] for at, memory in result["memory"] if at >= SOAK_S - 600 and name in memory]
+        if not early or not late:
+            raise Skipped(f"{name} was not there all the time")
+        growth[name] = 100 * (statistics.median(late) / statistics.median(early) - 1)
+        print(f"figures: {name}: {statistics.median(early) / 1024:.1f} MiB, then {growth[name]:+.2f} %", file=sys.stderr)
+    print(f"figures: IMU to INS, median of the first quarter {result['imu_to_ins_first_us']:.0f} us, of the last {result['imu_to_ins_last_us']:.0f} us; "
+          f"the player was {result['behind_s']:.2f} s behind at most", file=sys.stderr)
+    return max(growth.values())
+
+
+MEASUREMENTS = {"dashboard_cpu_pct": dashboard_cpu_pct, "first_paint_ms": first_paint_ms,
+                "imu_to_ins_p50_us": imu_to_ins_p50_us, "camera_to_fused_p99_ms": camera_to_fused_p99_ms,
+                "soak_rss_growth_pct": soak_rss_growth_pct}
