@@ -16,6 +16,8 @@ constexpr int kDrainAtOnce = 1000;
 constexpr int kHandleAtOnce = 1000;
 constexpr auto kHandleFor = std::chrono::milliseconds(100);
 constexpr std::size_t kMaxFreeBuffers = 256;
+/// Of one that is kept: a buffer never shrinks, so in the end each would be as large as the largest message ever.
+constexpr std::size_t kMaxFreeBytes = 16 << 10;
 
 std::string with_receive_buffer(const std::string& url) {
   if (!url.starts_with("udpm://") || url.find("recv_buf_size=") != std::string::npos) return url;
@@ -114,7 +116,9 @@ bool NetworkBus::handle(std::chrono::milliseconds patience) {
     --message.subscription->status.depth;
     message.subscription->waiting_bytes -= message.bytes.size();
     message.subscription->handler({message.channel, message.bytes, message.received_us});
-    if (free_.size() < kMaxFreeBuffers) free_.push_back(std::move(message.bytes));
+    if (free_.size() < kMaxFreeBuffers && message.bytes.capacity() <= kMaxFreeBytes) {
+      free_.push_back(std::move(message.bytes));
+    }
     drain();
   }
   return true;
