@@ -45,6 +45,6 @@ ServerOptions options_of(const DashboardConfig& config) {
 }  // namespace
 
 Dashboard::Dashboard(const DashboardConfig& config, Health& health, const std::string& name, bool log)
-    : board_(name, log), view_(board_, health, config.rate, log), server_(board_, options_of(config)) {}
+    : board_(name, log), view_(board_, health, config.rate, log, config.camera), server_(board_, options_of(config)) {}
 
 }  // namespace roadfix

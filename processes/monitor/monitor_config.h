@@ -13,6 +13,7 @@ struct DashboardConfig {
   std::string listen = "127.0.0.1:8420";  ///< address:port; other addresses only with a token
   std::string token_file;  ///< the token that other addresses need; empty: a new one at each start, printed
   double rate = 5.0;       ///< Hz
+  std::string camera;      ///< the channel whose pictures are shown; empty: CAMERA_LEFT, else the first one heard
   int clients = 32;        ///< connections at once
 };
 
@@ -37,6 +38,7 @@ void visit(DashboardConfig& c, Visitor& v) {
   v.text("listen", c.listen);
   v.text("token_file", c.token_file);
   v.number("rate_hz", c.rate, 0.2, 10.0);
+  v.text("camera", c.camera);
   v.integer("clients", c.clients, 1, 256);
 }
 

@@ -26,11 +26,13 @@ double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::
 
 }  // namespace
 
-DriveView::DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay)
+DriveView::DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay, const std::string& camera)
     : board_(board),
       health_(health),
       period_us_(std::llround(1e6 / rate_hz)),
       bytes_stay_(bytes_stay),
+      chosen_(!camera.empty()),
+      camera_(camera),
       reference_("REFERENCE", PoseLimits{}) {}
 
 void DriveView::message(const std::string& channel, const std::string& type, const BusMessage& message,
@@ -49,7 +51,9 @@ void DriveView::message(const std::string& channel, const std::string& type, con
     ins_status_ = decode<ins_status_t>(message.bytes);
   } else if (type == "gnss_t") {
     gnss_ = decode<gnss_t>(message.bytes);
-  } else if (channel == "CAMERA_LEFT") {
+  } else if (type == "image_t") {
+    if (!chosen_ && (camera_.empty() || channel == "CAMERA_LEFT")) camera_ = channel;
+    if (channel != camera_) return;
     picture_utime_ = read_header(message.bytes)->utime;
     if (board_.watched()) keep_picture(message);
   }

@@ -19,7 +19,8 @@ class DriveView : public MonitorListener {
  public:
   /// Both must outlive it. `rate_hz`: frames per second, at most that of the decisions. `bytes_stay`: a log's messages
   /// stay where they are and need no copy.
-  DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay);
+  /// `camera`: the channel whose pictures are shown; empty: CAMERA_LEFT, or another one as long as that is not heard.
+  DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay, const std::string& camera = "");
 
   void message(const std::string& channel, const std::string& type, const BusMessage& message, int64_t now_us) override;
   void decided(const HealthReport& report, bool changed) override;
@@ -51,6 +52,8 @@ class DriveView : public MonitorListener {
   Health& health_;
   int64_t period_us_;
   bool bytes_stay_;
+  bool chosen_;         ///< the camera is, by the configuration
+  std::string camera_;  ///< whose pictures are shown
   int64_t framed_us_ = 0;
   std::map<std::string, Pin> pins_;
   PoseWatch reference_;

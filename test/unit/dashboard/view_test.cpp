@@ -18,10 +18,12 @@ constexpr int64_t kStart_us = 1'700'000'000'000'000;
 struct Bench {
   MonitorHandler handler{MonitorConfig{}, Expectations{}};
   Board board{"x", true};
-  DriveView view{board, handler.health(), 5.0, false};
+  DriveView view;
   int64_t seq = 0;
 
-  Bench() { handler.add(view); }
+  explicit Bench(const std::string& camera = "") : view(board, handler.health(), 5.0, false, camera) {
+    handler.add(view);
+  }
 
   template <class T>
   void send(const std::string& channel, int64_t utime, T message) {
@@ -142,4 +144,26 @@ TEST_CASE("fusion, camera and history are in the frame") {
   const auto history = nlohmann::json::parse(bench.board.history().json());
   CHECK(history["t"].size() >= 4);
   CHECK(history["poses"]["POSE_FUSED"]["err"].back().get<double>() == Approx(1.0).margin(0.01));
+}
+
+TEST_CASE("the camera shown: the left one as soon as it is heard, or the one that the configuration names") {
+  for (const std::string camera : {"", "CAMERA_RIGHT"}) {
+    Bench bench(camera);
+    bench.drive(2.0);
+    const auto shown = [&] {
+      return nlohmann::json::parse(bench.view.frame(bench.handler.health().report()))["camera"]["picture"];
+    };
+    image_t image{};
+    image.format = image_t::FORMAT_GRAY8;
+    image.width_px = image.height_px = 2;
+    image.data.assign(4, 100);
+    image.size_bytes = 4;
+    const int64_t t = kStart_us + 2'010'000;
+    bench.send("CAMERA_RIGHT", t, image);
+    CHECK(shown() == std::to_string(t));
+    bench.send("CAMERA_LEFT", t + 1'000, image);
+    CHECK(shown() == std::to_string(camera.empty() ? t + 1'000 : t));
+    bench.send("CAMERA_RIGHT", t + 2'000, image);
+    CHECK(shown() == std::to_string(camera.empty() ? t + 1'000 : t + 2'000));
+  }
 }
