@@ -17,6 +17,8 @@ int main(int argc, char** argv) {
   app.add_option("--log-out", options.log_out, "Write HEALTH of the log to this one, and end");
   app.add_option("--listen", options.listen,
                  "address:port of the web page; another machine's needs the token it prints");
+  app.add_option("--realtime", options.realtime, "Scheduling priority (SCHED_FIFO); others wait while this runs")
+      ->check(CLI::Range(1, 99));
   app.add_flag("--no-dashboard", options.no_dashboard, "No web page");
   app.add_flag("--plain", options.plain, "Lines instead of a screen");
   app.add_flag("--print-config", options.print_config, "Print the effective configuration and end");

@@ -17,12 +17,16 @@ volatile std::sig_atomic_t stop_asked = 0;
 struct Options {
   std::filesystem::path vehicle;
   std::string bus;
+  int realtime = 0;
   bool print_config = false;
 };
 
 void run(const Options& options) {
   RunConfig config = load_config<RunConfig>(options.vehicle / "run.yaml");
   if (!options.bus.empty()) config.bus = options.bus;
+  for (SupervisedProcess& process : config.processes) {
+    if (!process.plain && process.realtime_priority == 0) process.realtime_priority = options.realtime;
+  }
   if (options.print_config) {
     std::cout << config_text(config);
     return;
@@ -48,6 +52,10 @@ void add_run_command(CLI::App& app) {
       ->required()
       ->check(CLI::ExistingDirectory);
   command->add_option("--bus", options->bus, "LCM URL instead of run.yaml's");
+  command
+      ->add_option("--realtime", options->realtime,
+                   "scheduling priority (SCHED_FIFO) of our programs that run.yaml gives none")
+      ->check(CLI::Range(1, 99));
   command->add_flag("--print-config", options->print_config, "print the effective configuration and end");
   command->callback([options] { run(*options); });
 }
