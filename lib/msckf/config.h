@@ -73,7 +73,7 @@ struct MsckfTrust {
   double block_s = 0.5;            ///< of imu samples that say whether the car stands
   double standing_gyro = 0.01;     ///< rad/s, by which quarters of a block may differ
   double standing_accel = 0.12;    ///< m/s2
-  double standing_flow_px = 1.0;   ///< median motion of the tracks over 0.5 to 1 s
+  double standing_flow_px = 1.0;   ///< of the tracks over 0.5 to 1 s, besides their noise
   double standing_speed = 0.15;    ///< m/s, the filter's own, above which it is not standing without a picture
   double max_speed = 70.0;         ///< m/s
   double max_bias_sigmas = 8.0;    ///< of an imu bias against its calibrated spread

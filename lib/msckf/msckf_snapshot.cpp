@@ -76,12 +76,12 @@ void TrackStore::serialise(Archive& a) {
 template <class Archive>
 void Standing::serialise(Archive& a) {
   a(sums_, times_, block_.end_us, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander);
-  for (Picture* picture : {&older_, &newer_}) {
+  for (Picture* picture : {&older_, &newer_, &last_, &before_}) {
     a(picture->t_us);
     list(a, picture->places, kMost, [&](Place& p) { a(p.track, p.left); });
   }
   optional(a, flow_, [&](double& flow) { a(flow); });
-  a(frame_us_, wheels_us_, wheels_rest_);
+  a(num_flow_, noise_, frame_us_, wheels_us_, wheels_rest_);
 }
 
 template <class Archive>

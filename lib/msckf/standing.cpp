@@ -12,6 +12,17 @@ constexpr int64_t kPictureAgeUs = 500'000;
 constexpr int64_t kWheelAgeUs = 1'000'000;
 constexpr double kShaken = 3.0;
 constexpr double kWheelRest = 0.02;  // m/s
+// Of the length of a normal vector in the plane, over its sigma: the median, and the median's scatter times sqrt(n).
+constexpr double kMedian = 1.1774;  // sqrt(2 ln 2)
+constexpr double kMedianScatter = 0.8493;
+constexpr double kMedianSigmas = 3.0;
+constexpr double kNoiseMemory = 0.8;  // per picture
+
+double take_median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 }  // namespace
 
@@ -48,17 +59,44 @@ void Standing::add(const SeenFrame& frame) {
   }
   flow_.reset();
   if (moved_.size() >= kEnoughTracks) {
-    const auto middle = moved_.begin() + static_cast<std::ptrdiff_t>(moved_.size() / 2);
-    std::nth_element(moved_.begin(), middle, moved_.end());
-    flow_ = *middle;
+    flow_ = take_median(moved_);
+    num_flow_ = static_cast<int>(moved_.size());
   }
+  measure_noise(frame);
   const auto half_second = static_cast<int64_t>(1e6 * trust_.block_s);
+  if (frame.t_us - older_.t_us < half_second) flow_.reset();  // the first pictures: too short to tell a slow car
   if (frame.t_us - newer_.t_us < half_second) return;
   std::swap(older_, newer_);
   newer_.t_us = frame.t_us;
   newer_.places.clear();
   for (const SeenPoint& point : frame.points) newer_.places.push_back({point.track, point.left});
   if (older_.places.empty()) older_ = newer_;
+}
+
+void Standing::measure_noise(const SeenFrame& frame) {
+  moved_.clear();
+  auto last = last_.places.begin();
+  auto before = before_.places.begin();
+  for (const SeenPoint& point : frame.points) {
+    while (last != last_.places.end() && last->track < point.track) ++last;
+    while (before != before_.places.end() && before->track < point.track) ++before;
+    if (last == last_.places.end() || before == before_.places.end()) break;
+    if (last->track != point.track || before->track != point.track) continue;
+    moved_.push_back(point.px * (point.left - 2.0 * last->left + before->left).norm());
+  }
+  if (moved_.size() >= kEnoughTracks) {
+    const double now = take_median(moved_) / (std::sqrt(6.0) * kMedian);
+    noise_ = noise_ > 0.0 ? kNoiseMemory * noise_ + (1.0 - kNoiseMemory) * now : now;
+  }
+  std::swap(before_, last_);
+  last_.t_us = frame.t_us;
+  last_.places.clear();
+  for (const SeenPoint& point : frame.points) last_.places.push_back({point.track, point.left});
+}
+
+double Standing::flow_limit() const {
+  const double scatter = kMedianSigmas * kMedianScatter / std::sqrt(std::max(num_flow_, 1));
+  return std::hypot(trust_.standing_flow_px, std::sqrt(2.0) * noise_ * (kMedian + scatter));
 }
 
 void Standing::add_speed(int64_t t_us, double speed) {
@@ -75,7 +113,7 @@ bool Standing::stands(int64_t t_us, std::optional<double> speed) const {
     return block_.gyro_wander < times * trust_.standing_gyro && block_.accel_wander < times * trust_.standing_accel;
   };
   // A still picture is the better witness: an engine that shakes the imu does not move the car.
-  if (flow_ && t_us - frame_us_ < kPictureAgeUs) return *flow_ < trust_.standing_flow_px && quiet(kShaken);
+  if (flow_ && t_us - frame_us_ < kPictureAgeUs) return *flow_ < flow_limit() && quiet(kShaken);
   if (!quiet(1.0)) return false;
   return wheels_known || (speed && *speed < trust_.standing_speed);
 }

@@ -30,6 +30,10 @@ class Standing {
   [[nodiscard]] const ImuBlock& block() const { return block_; }
   /// Median motion of the tracks over the last half to whole second, px; nothing without enough of them.
   [[nodiscard]] const std::optional<double>& flow() const { return flow_; }
+  /// Noise of a track's coordinate, px, from how three pictures in a row disagree; zero before the third.
+  [[nodiscard]] double noise() const { return noise_; }
+  /// What flow() may be of a vehicle that stands: the allowed motion, and what the noise alone can show, (M.38).
+  [[nodiscard]] double flow_limit() const;
 
   template <class Archive>
   void serialise(Archive& a);
@@ -45,12 +49,17 @@ class Standing {
     std::vector<Place> places;
   };
 
+  void measure_noise(const SeenFrame& frame);
+
   MsckfTrust trust_;
   Eigen::Matrix<double, 6, kQuarters> sums_ = Eigen::Matrix<double, 6, kQuarters>::Zero();
   Eigen::Vector4d times_ = Eigen::Vector4d::Zero();
   ImuBlock block_;
   Picture older_, newer_;
+  Picture last_, before_;  ///< the two pictures before the newest
   std::optional<double> flow_;
+  int num_flow_ = 0;  ///< tracks that flow_ is of
+  double noise_ = 0.0;
   int64_t frame_us_ = 0;
   int64_t wheels_us_ = 0;
   bool wheels_rest_ = false;

@@ -106,8 +106,6 @@ MsckfConfig filter_config(const VisualDriveConfig& config) {
   v.wheel_noise = s.wheels.speed_noise_mps;
   v.mounting_std = 1e-3;
   c.window.sigma_px = config.tracks.noise_px;
-  // Of a standing camera: the median distance of two sightings is 1.7 times their noise.
-  c.trust.standing_flow_px = std::max(c.trust.standing_flow_px, 2.5 * config.tracks.noise_px);
   return c;
 }
 
