@@ -105,6 +105,7 @@ void Msckf::serialise(Archive& a) {
   a(phase_, scale_, reason_, stands_, reset_counter_, last_pose_.q.coeffs(), last_pose_.p, stamp_us, next_clone_,
     clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_, used_us_, doubtful_us_, used_share_,
     num_seen_);
+  stamps_.set_last(stamp_us);
 }
 
 std::vector<uint8_t> Msckf::save() const {
