@@ -18,6 +18,9 @@ constexpr double kGaugeStd = 1e-4;          // m and rad: where the frame begins
 constexpr double kSpeedAge_s = 0.5;
 constexpr double kTurnRate = 0.1;   // rad/s, least that tells a speed
 constexpr double kTurnSpeed = 2.0;  // m/s
+// m/s2 along the way, standard deviation of everyday driving: what changes a speed between its sample and the start,
+// and what levelling takes for a slope.
+constexpr double kStartAccel = 1.5;
 
 using BaseMatrix = Eigen::Matrix<double, kBaseSize, kBaseSize>;
 
@@ -42,14 +45,18 @@ bool Msckf::start_standing(int64_t t_us) {
 
 std::optional<Msckf::KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
   for (const std::optional<KnownSpeed>& s : {wheel_speed_, known_speed_})
-    if (s && std::abs(seconds_between(s->t_us, t_us)) < kSpeedAge_s) return s;
+    if (s && std::abs(seconds_between(s->t_us, t_us)) < kSpeedAge_s)
+      return KnownSpeed{s->t_us, s->speed, std::hypot(s->sigma, kStartAccel * seconds_between(s->t_us, t_us))};
   // A turn tells it: lateral acceleration over yaw rate, as far as the road is level, (M.33).
   const ImuBlock& block = standing_.block();
   const double rate = block.gyro.z();
   if (std::abs(rate) < kTurnRate || block.gyro_wander > 0.5 * std::abs(rate)) return std::nullopt;
   const double speed = block.accel.y() / rate;
   const double tilt = std::hypot(config_.aiding.planar_slack, config_.vehicle.mounting_std);
-  const double sigma = std::hypot(config_.vehicle.gravity * tilt, config_.vehicle.accel_bias_std) / std::abs(rate);
+  const double told = std::hypot(config_.vehicle.gravity * tilt, config_.vehicle.accel_bias_std) / std::abs(rate);
+  // The block's mean is that of its middle, up to one and a half blocks ago.
+  const double age = seconds_between(block.end_us, t_us) + 0.5 * config_.trust.block_s;
+  const double sigma = std::hypot(told, kStartAccel * age);
   if (speed < kTurnSpeed || speed > config_.trust.max_speed || sigma > 0.5 * speed) return std::nullopt;
   return KnownSpeed{t_us, speed, sigma};
 }
@@ -64,16 +71,18 @@ bool Msckf::start_moving(int64_t t_us) {
   }
   // What the mean specific force has besides gravity: the turn's lateral acceleration; the rest is doubt.
   const Eigen::Vector3d turning(0.0, known->speed * block.gyro.z(), 0.0);
-  const double doubt = 0.1 + block.accel_wander / config_.vehicle.gravity;
+  const double doubt =
+      std::hypot(0.1, kStartAccel / config_.vehicle.gravity) + block.accel_wander / config_.vehicle.gravity;
   const Eigen::Vector3d forward = state_.camera.R_imu_vehicle().col(0);
   begin_at(t_us, (block.accel - turning).normalized(), known->speed * forward, known->sigma + 0.1, doubt);
   const Eigen::Matrix3d R = state_.imu.R();
   const double side = 0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed);  // m/s
   const Eigen::Vector3d std(known->sigma + 0.1, side, side);
-  const Eigen::Matrix3d V = skew(state_.imu.v);
+  // The speed is known in vehicle axes, whatever the attitude is: by (M.1) R' v = R^' (v^ + nu), free of phi, (M.39).
   Eigen::MatrixXd& P = state_.P();
-  P.block<3, 3>(kVel, kVel) =
-      R * std.cwiseAbs2().asDiagonal() * R.transpose() + V * P.block<3, 3>(kAtt, kAtt) * V.transpose();
+  P.middleRows<3>(kVel).leftCols<kBaseSize>().setZero();
+  P.middleCols<3>(kVel).topRows<kBaseSize>().setZero();
+  P.block<3, 3>(kVel, kVel) = R * std.cwiseAbs2().asDiagonal() * R.transpose();
   scale_ = known->t_us == t_us ? MsckfScale::kInertial : MsckfScale::kWheels;
   return true;
 }
@@ -114,7 +123,7 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   P.block<3, 3>(kAtt, kAtt) += bias * tilt * tilt.transpose();
   P.block<3, 3>(kAtt, kAccelBias) = bias * tilt;
   P.block<3, 3>(kAccelBias, kAtt) = P.block<3, 3>(kAtt, kAccelBias).transpose();
-  // phi moves velocity and position with it, (M.1): what is known is the plain error.
+  // phi moves velocity and position with it, (M.1): what is known is the plain error (not so in motion: there).
   Eigen::Matrix<double, 9, 9> J = Eigen::Matrix<double, 9, 9>::Identity();
   J.block<3, 3>(kVel, kAtt) = skew(imu.v);
   J.block<3, 3>(kPos, kAtt) = skew(imu.p);
