@@ -64,7 +64,7 @@ void Standing::add(const SeenFrame& frame) {
   }
   measure_noise(frame);
   const auto half_second = static_cast<int64_t>(1e6 * trust_.block_s);
-  if (frame.t_us - older_.t_us < half_second) flow_.reset();  // the first pictures: too short to tell a slow car
+  if (frame.t_us - older_.t_us < half_second / 2) flow_.reset();  // the first pictures: too short to tell a slow car
   if (frame.t_us - newer_.t_us < half_second) return;
   std::swap(older_, newer_);
   newer_.t_us = frame.t_us;
