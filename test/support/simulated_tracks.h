@@ -1,5 +1,5 @@
 /// A front end, and a right eye, fed by simulated tracks instead of pictures: what the estimator does with them can be
-/// held against the truth a hundred times faster than by drawing.
+/// held against the truth two hundred times faster than by drawing.
 #pragma once
 
 #include <set>

@@ -67,14 +67,15 @@ std::array<Float3, 4> seen_from(const Eigen::Vector3d& origin, const Face& f, co
   return out;
 }
 
-/// Quads under one Embree scene; corners in window coordinates.
+/// Quads under one Embree scene; corners in window coordinates. The quality is of the tree alone, the hits do not
+/// depend on it.
 class QuadScene {
  public:
   QuadScene() = default;
-  QuadScene(RTCDevice device, std::span<const std::array<Float3, 4>> faces) {
+  QuadScene(RTCDevice device, std::span<const std::array<Float3, 4>> faces, RTCBuildQuality quality) {
     if (faces.empty()) return;
     scene_ = rtcNewScene(device);
-    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneBuildQuality(scene_, quality);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_QUAD);
     auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                3 * sizeof(float), 4 * faces.size()));
@@ -249,7 +250,7 @@ struct RayScene::Impl {
       impl->add(shade_of(f, SE3{}, Eigen::Vector3d::Zero()), seen_from(impl->origin, f, SE3{}));
     }
     impl->num_static = impl->faces.size();
-    impl->still = QuadScene(device, impl->corners);
+    impl->still = QuadScene(device, impl->corners, RTC_BUILD_QUALITY_HIGH);
     return std::make_unique<RayWindow>(std::move(impl));
   }
 
@@ -270,7 +271,7 @@ struct RayScene::Impl {
         window.add(shade, seen_from(window.origin, f, T_enu_car));
       }
     }
-    window.moving = QuadScene(device, std::span(window.corners).subspan(window.num_static));
+    window.moving = QuadScene(device, std::span(window.corners).subspan(window.num_static), RTC_BUILD_QUALITY_LOW);
     window.moving_shadows.reset();
   }
 

@@ -1,5 +1,5 @@
 /// Tracks without pixels: points on the world's surfaces, projected with noise, hidden where something stands before
-/// them, mixed with outliers. What a feature tracker would give, a hundred times faster than by drawing pictures,
+/// them, mixed with outliers. What a feature tracker would give, two hundred times faster than by drawing pictures,
 /// with the truth beside every observation.
 ///
 /// Same world, configuration, seed and views in the same order give the same bits.
