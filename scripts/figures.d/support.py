@@ -11,7 +11,7 @@ class Skipped(Exception):
 
 def root_mean_square(values):
     values = list(values)
-    return math.sqrt(sum(v * v for v in values) / len(values))
+    return math.sqrt(sum(v * v for v in values) / len(values)) if values else math.nan
 
 
 class Runs:
