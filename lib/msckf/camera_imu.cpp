@@ -80,7 +80,7 @@ struct Fit {
   int rates = 0;
 };
 
-/// Rotation that fits rates and directions best at this offset, (M.36); rounds of reweighting keep wrong pairs out.
+/// Rotation that fits rates and directions best at this offset; rounds of reweighting keep wrong pairs out.
 std::optional<Fit> fit_at(const std::vector<ViewPair>& pairs, const Samples& samples, double offset_s,
                           const Eigen::Vector3d& forward) {
   struct Rates {

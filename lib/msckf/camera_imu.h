@@ -1,6 +1,6 @@
 /// How the camera sits on the imu and how late its stamps are, from a drive's tracks and gyro alone: no scale, no
 /// start, any error at the beginning. Rotation by turning rates and, because a car turns about one axis only, by the
-/// direction of travel; time by what makes the rates agree, (M.35)-(M.37).
+/// direction of travel; time by what makes the rates agree.
 #pragma once
 
 #include <span>
