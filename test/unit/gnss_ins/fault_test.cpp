@@ -94,7 +94,7 @@ namespace {
 
 /// Share of the level errors within three of their sigmas, in and after half a minute of multipath.
 double honest_share(bool learns_correlation) {
-  int inside = 0, scored = 0;
+  test::LevelScore score;
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     ScenarioConfig s = scenario("city_loop");
     s.duration_s = 110.0;
@@ -104,18 +104,9 @@ double honest_share(bool learns_correlation) {
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_error_correlation = learns_correlation;
     GnssIns filter(config);
-    int64_t next = drive.imu.front().t_us + 60'000'000;
-    test::run(filter, test::Samples(drive), [&](GnssIns& f, int64_t now) {
-      f.clear_records();
-      if (now < next) return;
-      next += 500'000;
-      const Odometry o = f.output().odometry;
-      const auto e = test::error_of(f, o, drive);
-      for (int i = 0; i < 2; ++i) inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
-      scored += 2;
-    });
+    score.run(filter, drive, 60.0, s.duration_s);
   }
-  return static_cast<double>(inside) / scored;
+  return score.share();
 }
 
 }  // namespace
@@ -140,8 +131,7 @@ struct Return {
 /// A bridge and a minute of tunnel; the fixes after it are off by `reacquire` (nothing: as good as before) and do not
 /// say so.
 Return return_from_tunnel(const char* reacquire, FixType type, double sigma_m, bool doubts) {
-  int inside = 0, scored = 0;
-  double squares = 0.0, variances = 0.0;
+  test::LevelScore score;
   for (uint64_t seed = 1; seed <= 6; ++seed) {
     ScenarioConfig s = scenario("tunnel_dark");
     s.duration_s = 172.0;
@@ -155,23 +145,9 @@ Return return_from_tunnel(const char* reacquire, FixType type, double sigma_m, b
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_outage_doubt = doubts;
     GnssIns filter(config);
-    int64_t next = drive.imu.front().t_us + 151'000'000;
-    const int64_t last = next + 20'000'000;
-    test::run(filter, test::Samples(drive), [&](GnssIns& f, int64_t now) {
-      f.clear_records();
-      if (now < next || now > last) return;
-      next += 500'000;
-      const Odometry o = f.output().odometry;
-      const auto e = test::error_of(f, o, drive);
-      for (int i = 0; i < 2; ++i) {
-        inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
-        squares += e(i) * e(i);
-        variances += o.cov_pose(i, i);
-      }
-      scored += 2;
-    });
+    score.run(filter, drive, 151.0, 171.0);
   }
-  return {static_cast<double>(inside) / scored, std::sqrt(squares / scored), std::sqrt(variances / scored)};
+  return {score.share(), std::sqrt(score.squares / score.scored), std::sqrt(score.variances / score.scored)};
 }
 
 }  // namespace

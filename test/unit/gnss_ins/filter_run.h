@@ -2,6 +2,7 @@
 /// behind.
 #pragma once
 
+#include <cmath>
 #include <functional>
 
 #include "gnss_ins/gnss_ins.h"
@@ -87,5 +88,32 @@ inline Eigen::Matrix<double, 9, 1> error_of(const GnssIns& filter, const Odometr
   e.tail<3>() = drive.errors.q_vehicle_imu.conjugate() * truth.velocity - estimate.velocity;
   return e;
 }
+
+/// The level errors, every half second, against the sigmas that are claimed.
+struct LevelScore {
+  int inside = 0, scored = 0;  ///< values within three sigmas, values
+  double squares = 0.0, variances = 0.0;
+
+  /// Runs the filter over the drive and scores it from `from_s` to `to_s` after the first IMU sample.
+  void run(GnssIns& filter, const SimulatedDrive& drive, double from_s, double to_s) {
+    const int64_t start = drive.imu.front().t_us, last = start + std::llround(1e6 * to_s);
+    int64_t next = start + std::llround(1e6 * from_s);
+    test::run(filter, Samples(drive), [&](GnssIns& f, int64_t now) {
+      f.clear_records();
+      if (now < next || now > last) return;
+      next += 500'000;
+      const Odometry o = f.output().odometry;
+      const auto e = error_of(f, o, drive);
+      for (int i = 0; i < 2; ++i) {
+        inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
+        squares += e(i) * e(i);
+        variances += o.cov_pose(i, i);
+      }
+      scored += 2;
+    });
+  }
+
+  [[nodiscard]] double share() const { return static_cast<double>(inside) / scored; }
+};
 
 }  // namespace roadfix::test

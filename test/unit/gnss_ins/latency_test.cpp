@@ -11,7 +11,7 @@ namespace {
 
 /// Share of the level errors within three of their sigmas, after a minute, where fixes are 80 ms old at their stamps.
 double honest_share(const Calibration& calibration) {
-  int inside = 0, scored = 0;
+  test::LevelScore score;
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     ScenarioConfig s = scenario("city_loop");
     s.duration_s = 110.0;
@@ -22,18 +22,9 @@ double honest_share(const Calibration& calibration) {
     config.vehicle.position_latency_std = said.position_latency_std;
     config.vehicle.velocity_latency_std = said.velocity_latency_std;
     GnssIns filter(config);
-    int64_t next = drive.imu.front().t_us + 60'000'000;
-    test::run(filter, test::Samples(drive), [&](GnssIns& f, int64_t now) {
-      f.clear_records();
-      if (now < next) return;
-      next += 500'000;
-      const Odometry o = f.output().odometry;
-      const auto e = test::error_of(f, o, drive);
-      for (int i = 0; i < 2; ++i) inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
-      scored += 2;
-    });
+    score.run(filter, drive, 60.0, s.duration_s);
   }
-  return static_cast<double>(inside) / scored;
+  return score.share();
 }
 
 }  // namespace
