@@ -77,6 +77,7 @@ gnss_t to_message(const GnssFix& fix) {
   message.height_kind = static_cast<int8_t>(fix.height_kind);
   message.lat_deg = fix.antenna.latitude / kDegree;
   message.lon_deg = fix.antenna.longitude / kDegree;
+  if (message.lon_deg >= 180.0) message.lon_deg = -180.0;  // [-180, 180)
   message.height_m = fix.antenna.height;
   put(fix.cov_enu, message.cov_enu_m2);
   message.has_velocity = fix.velocity.has_value() ? 1 : 0;

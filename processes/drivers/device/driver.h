@@ -60,6 +60,7 @@ struct StreamCounters {
   int64_t late = 0;           ///< not later than what was published before
   int64_t skipped_bytes = 0;  ///< that belong to no frame
   int64_t newest_utime = 0;   ///< of what was published
+  bool operator==(const StreamCounters&) const = default;
 };
 
 class SensorDriver {

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "drivers/gnss_driver/fix_limits.h"
+
 namespace roadfix {
 
 namespace {
@@ -50,7 +52,11 @@ void GnssEpochs::close() {
     if ((expected_ & bit) == 0 || (parts_ & bit) != 0) continue;
     if (++missed_[i] >= kMissesAllowed) expected_ &= ~bit;
   }
-  if (has(kPosition)) whole_.push_back(fix_);
+  if (has(kPosition)) {
+    const FixLimits limits = limit_fix(fix_);
+    refused_ += limits.refused;
+    if (limits.publish) whole_.push_back(fix_);
+  }
   open_ = false;
 }
 

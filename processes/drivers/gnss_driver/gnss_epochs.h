@@ -33,8 +33,11 @@ class GnssEpochs {
   /// The device was opened anew.
   void reset();
 
-  /// Fixes that are whole, oldest first. Only those that have a position.
+  /// Fixes that are whole, oldest first. Only those that have a position, within fix_limits.h.
   std::vector<GnssFix> take();
+
+  /// Parts that no receiver can mean.
+  [[nodiscard]] int64_t refused() const { return refused_; }
 
  private:
   void close();
@@ -45,6 +48,7 @@ class GnssEpochs {
   unsigned parts_ = 0;
   unsigned expected_ = 0;
   int missed_[kParts] = {};
+  int64_t refused_ = 0;
   GnssFix fix_;
   std::vector<GnssFix> whole_;
 };

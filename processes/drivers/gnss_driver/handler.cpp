@@ -143,7 +143,7 @@ void GnssDriver::take_pvt(const UbxNavPvt& m, int64_t read_utime) {
       kMetresPerMm * Eigen::Vector3d(m.velocity_ned_mmps[1], m.velocity_ned_mmps[0], -m.velocity_ned_mmps[2]);
   const double speed_std = m.speed_accuracy_mmps * kMetresPerMm;
   velocity.cov_enu = diagonal(speed_std, speed_std, speed_std);
-  if (fix->fix_type != FixType::kNone) fix->velocity = velocity;
+  fix->velocity = velocity;
   fix->num_satellites = m.num_satellites;
   fix->pdop = m.pdop_1e2 * 0.01;
   fix->correction_age = ubx_correction_age_s(m.correction_age_class);
@@ -207,7 +207,8 @@ void GnssDriver::take_gga(const NmeaGga& gga, int64_t read_utime) {
     fix->antenna.height = *gga.height_msl_m + gga.geoid_separation_m.value_or(0.0);
     fix->height_kind = gga.geoid_separation_m ? HeightKind::kEllipsoid : HeightKind::kMeanSeaLevel;
   }
-  const double horizontal = sigma_of(fix->fix_type, config_.nmea) * gga.hdop.value_or(1.0);
+  const double dop = gga.hdop && *gga.hdop > 0.0 ? *gga.hdop : 1.0;  // some say 0 where they know none
+  const double horizontal = sigma_of(fix->fix_type, config_.nmea) * dop;
   if (!epochs_.has(GnssEpochs::kAccuracy)) {
     fix->cov_enu = diagonal(horizontal, horizontal, config_.nmea.vertical_ratio * horizontal);
   }
@@ -268,7 +269,8 @@ std::vector<StreamCounters> GnssDriver::counters() const {
   StreamCounters ubx, nmea, messages;
   ubx = {"UBX", framer_.frames(kUbx), ubx_.used, framer_.bad_checksums(kUbx), ubx_.refused, 0, 0, 0};
   nmea = {"NMEA", framer_.frames(kNmea), nmea_.used, framer_.bad_checksums(kNmea), nmea_.refused, 0, 0, 0};
-  messages = {config_.channel, published_ + late_, published_, 0, 0, late_, framer_.skipped_bytes(), newest_utime_};
+  messages = {config_.channel, published_ + late_,      published_,   0, epochs_.refused(),
+              late_,           framer_.skipped_bytes(), newest_utime_};
   return {messages, ubx, nmea};
 }
 

@@ -5,6 +5,7 @@
 
 #include "bus/sample_codec.h"
 #include "config/config.h"
+#include "drivers/gnss_driver/fix_limits.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"
 
@@ -48,10 +49,20 @@ FixType fix_type(SbgPositionType type) {
   }
 }
 
-bool on_earth(double lat_deg, double lon_deg) { return std::abs(lat_deg) <= 90.0 && std::abs(lon_deg) <= 180.0; }
-
 Geodetic geodetic(double lat_deg, double lon_deg, double height_msl_m, double undulation_m) {
   return {lat_deg * kDegree, wrap_angle(lon_deg * kDegree), height_msl_m + undulation_m};
+}
+
+/// Whether the Ellipse's filter can mean what it says.
+bool can_be(const SbgEkfNav& nav, const SbgEkfQuat& quat, const Geodetic& where) {
+  GnssFix limits;  // a place, a velocity and their errors, whatever they come from
+  limits.fix_type = FixType::kSingle;
+  limits.antenna = where;
+  limits.cov_enu = variances(enu(nav.position_std_ned_m));
+  limits.velocity = GnssVelocity{enu(nav.velocity_ned_mps), variances(enu(nav.velocity_std_ned_mps))};
+  const Eigen::Vector3d angles_std = vector(quat.roll_pitch_yaw_std_rad);
+  return limit_fix(limits).refused == 0 && angles_std.allFinite() && angles_std.minCoeff() > 0.0 &&
+         angles_std.maxCoeff() <= kPi && std::abs(Eigen::Vector4d(quat.q_ned_body_wxyz).norm() - 1.0) < 0.1;
 }
 
 }  // namespace
@@ -137,9 +148,7 @@ void ImuDriver::take_imu(const SbgImuShort& imu, int64_t read_utime, SensorOutpu
 void ImuDriver::take_pos(const SbgGpsPos& pos, int64_t read_utime) {
   const std::optional<int64_t> utime = utime_of(pos.time_us, read_utime);
   const Eigen::Vector3d std(pos.std_east_m, pos.std_north_m, pos.std_up_m);
-  const bool sane =
-      on_earth(pos.lat_deg, pos.lon_deg) && finite(std) && std::isfinite(pos.height_msl_m + pos.undulation_m);
-  GnssFix* fix = utime && sane ? epochs_.part(pos.time_of_week_ms, GnssEpochs::kPosition, read_utime) : nullptr;
+  GnssFix* fix = utime ? epochs_.part(pos.time_of_week_ms, GnssEpochs::kPosition, read_utime) : nullptr;
   if (fix == nullptr) {
     ++refused_;
     return;
@@ -191,19 +200,13 @@ void ImuDriver::take_nav(const SbgEkfNav& nav, int64_t read_utime, SensorOutputs
   quat_.reset();
   constexpr uint8_t kFullNavigation = 4;
   const SbgSolution& s = nav.solution;
-  const Eigen::Vector3d angles_std = vector(quat.roll_pitch_yaw_std_rad), position_std = enu(nav.position_std_ned_m);
-  const Eigen::Vector3d velocity_std = enu(nav.velocity_std_ned_mps), velocity = enu(nav.velocity_ned_mps);
-  const double norm = Eigen::Vector4d(quat.q_ned_body_wxyz).norm();
-  const bool sane = on_earth(nav.lat_deg, nav.lon_deg) && std::isfinite(nav.height_msl_m + nav.undulation_m) &&
-                    finite(angles_std) && finite(position_std) && finite(velocity_std) && finite(velocity) &&
-                    std::abs(norm - 1.0) < 0.1;
-  const std::optional<int64_t> utime = sane ? utime_of(nav.time_us, read_utime) : std::nullopt;
+  const Geodetic where = geodetic(nav.lat_deg, nav.lon_deg, nav.height_msl_m, nav.undulation_m);
+  const std::optional<int64_t> utime = can_be(nav, quat, where) ? utime_of(nav.time_us, read_utime) : std::nullopt;
   if (!utime) {
     ++refused_;
     return;
   }
   ++used_;
-  const Geodetic where = geodetic(nav.lat_deg, nav.lon_deg, nav.height_msl_m, nav.undulation_m);
   const bool whole = s.mode == kFullNavigation && s.attitude_valid && s.heading_valid && s.position_valid;
   if (!anchor_ && whole) anchor_.emplace(where);
   if (!anchor_) return;  // no pose before there is a place
@@ -213,10 +216,12 @@ void ImuDriver::take_nav(const SbgEkfNav& nav, int64_t read_utime, SensorOutputs
   odometry.T_frame_vehicle.p = anchor_->enu(where);
   odometry.T_frame_vehicle.q = normalized_positive(Eigen::Quaterniond(R_anchor_here) * attitude(quat.q_ned_body_wxyz));
   const Eigen::Matrix3d R_vehicle_enu = odometry.T_frame_vehicle.q.conjugate().toRotationMatrix() * R_anchor_here;
-  odometry.velocity = R_vehicle_enu * velocity;
-  odometry.cov_velocity = R_vehicle_enu * variances(velocity_std) * R_vehicle_enu.transpose();
-  odometry.cov_pose.topLeftCorner<3, 3>() = R_anchor_here * variances(position_std) * R_anchor_here.transpose();
-  odometry.cov_pose.bottomRightCorner<3, 3>() = variances(angles_std);
+  odometry.velocity = R_vehicle_enu * enu(nav.velocity_ned_mps);
+  const Eigen::Matrix3d cov_velocity = variances(enu(nav.velocity_std_ned_mps));
+  odometry.cov_velocity = R_vehicle_enu * cov_velocity * R_vehicle_enu.transpose();
+  const Eigen::Matrix3d cov_position = variances(enu(nav.position_std_ned_m));
+  odometry.cov_pose.topLeftCorner<3, 3>() = R_anchor_here * cov_position * R_anchor_here.transpose();
+  odometry.cov_pose.bottomRightCorner<3, 3>() = variances(vector(quat.roll_pitch_yaw_std_rad));
   odometry.validity = whole ? Validity::kValid : Validity::kInvalid;
   pose_t pose{};
   fill_pose(odometry, pose);
@@ -238,8 +243,8 @@ std::vector<StreamCounters> ImuDriver::counters() const {
     rows.push_back(counters);
     rows.back().name = channel;
   }
-  rows.push_back(
-      {"sbgECom", framer_.frames(0), used_, framer_.bad_checksums(0), refused_, 0, framer_.skipped_bytes(), 0});
+  rows.push_back({"sbgECom", framer_.frames(0), used_, framer_.bad_checksums(0), refused_ + epochs_.refused(), 0,
+                  framer_.skipped_bytes(), 0});
   return rows;
 }
 

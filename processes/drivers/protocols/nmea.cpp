@@ -173,7 +173,7 @@ std::optional<NmeaGst> parse_gst(const NmeaSentence& s) {
   if (s.type != "GST") return std::nullopt;
   const auto time = nmea_time_of_day_us(field(s, 0));
   const auto north = not_negative(field(s, 5)), east = not_negative(field(s, 6)), up = not_negative(field(s, 7));
-  if (!time || !north || !east || !up) return std::nullopt;
+  if (!time || !north || !east || !up || *north == 0.0 || *east == 0.0 || *up == 0.0) return std::nullopt;
   return NmeaGst{*time, *north, *east, *up};
 }
 

@@ -52,6 +52,7 @@ struct NmeaMotion {
   std::optional<double> course_deg;  ///< clockwise from true north; absent when standing
 };
 
+/// Zeros stand for "not known" and make it absent.
 struct NmeaGst {
   int64_t time_of_day_us = 0;
   double north_std_m = 0.0, east_std_m = 0.0, up_std_m = 0.0;

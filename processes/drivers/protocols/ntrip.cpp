@@ -13,7 +13,6 @@ namespace roadfix {
 
 namespace {
 
-constexpr std::size_t kMaxHead = 8192;
 constexpr std::size_t kMaxChunk = std::size_t{1} << 20;
 constexpr int64_t kRtcmPatience_us = 5'000'000;  // a caster may pause within a frame
 
@@ -73,10 +72,10 @@ std::vector<uint8_t> NtripAnswer::feed(int64_t t_us, std::span<const uint8_t> by
 
 /// Version 1 answers one line; version 2 a head of HTTP, which ends with an empty line.
 void NtripAnswer::read_head() {
-  const std::string_view text(reinterpret_cast<const char*>(head_.data()), head_.size());
+  const std::string_view text(reinterpret_cast<const char*>(head_.data()), std::min(head_.size(), kMaxHead));
   const std::size_t line_end = text.find("\r\n");
   if (line_end == std::string_view::npos) {
-    if (text.size() > kMaxHead) refuse("answers no line");
+    if (text.size() == kMaxHead) refuse("answers no line");
     return;
   }
   const std::string first(text.substr(0, std::min<std::size_t>(line_end, 80)));
@@ -87,7 +86,7 @@ void NtripAnswer::read_head() {
     if (!first.starts_with("HTTP/1.") || first.size() < 12 || first.compare(9, 3, "200") != 0) return refuse(first);
     const std::size_t head_end = text.find("\r\n\r\n");
     if (head_end == std::string_view::npos) {
-      if (text.size() > kMaxHead) refuse("its head does not end");
+      if (text.size() == kMaxHead) refuse("its head does not end");
       return;
     }
     for (std::size_t at = end; at < head_end;) {
@@ -128,10 +127,11 @@ std::vector<uint8_t> NtripAnswer::unchunk() {
       --chunk_left_;
       continue;
     }
-    const std::string_view rest(reinterpret_cast<const char*>(head_.data()) + at, head_.size() - at);
+    const std::string_view rest(reinterpret_cast<const char*>(head_.data()) + at,
+                                std::min(head_.size() - at, kMaxHead));
     const std::size_t line_end = rest.find("\r\n");
     if (line_end == std::string_view::npos) {
-      if (rest.size() > kMaxHead) refuse("sends chunks without a length");
+      if (rest.size() == kMaxHead) refuse("sends chunks without a length");
       break;
     }
     std::size_t length = 0;

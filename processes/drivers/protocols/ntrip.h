@@ -26,6 +26,9 @@ std::string base64(const std::string& text);
 class NtripAnswer {
  public:
   enum class State { kWaiting, kStreaming, kRefused };
+  /// Bytes of an answer's head, or of the line before a chunk. Counted from its first one, so that it does not matter
+  /// in which pieces they come.
+  static constexpr std::size_t kMaxHead = 8192;
 
   NtripAnswer();
 
@@ -38,6 +41,8 @@ class NtripAnswer {
   [[nodiscard]] int64_t frames() const { return framer_.frames(0); }
   [[nodiscard]] int64_t bad_checksums() const { return framer_.bad_checksums(0); }
   [[nodiscard]] int64_t skipped_bytes() const { return framer_.skipped_bytes(); }
+  /// Kept for what is still to come: never more than a head and a frame.
+  [[nodiscard]] std::size_t waiting_bytes() const { return head_.size() + framer_.waiting_bytes(); }
 
  private:
   void read_head();

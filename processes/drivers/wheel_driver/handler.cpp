@@ -86,7 +86,8 @@ void WheelDriver::publish(int64_t utime, SensorOutputs& outputs) {
     speeds_[i].fresh = false;
     const std::optional<double>& value = speeds_[i].value;
     available = available && value && std::abs(*value) <= config_.max_speed;
-    if (available) sample.speeds[i] = *value;
+    if (available)
+      sample.speeds[i] = config_.speeds_signed ? *value : std::abs(*value);  // a magnitude, whatever the sign
   }
   if (!available) {
     ++unavailable_;
@@ -97,7 +98,10 @@ void WheelDriver::publish(int64_t utime, SensorOutputs& outputs) {
     if (contains(config_.forward, *direction_->raw)) sample.direction = WheelDirection::kForward;
     if (contains(config_.reverse, *direction_->raw)) sample.direction = WheelDirection::kReverse;
   }
-  if (yaw_rate_ && yaw_rate_->utime != 0 && young(*yaw_rate_, utime)) sample.yaw_rate = yaw_rate_->value;
+  if (yaw_rate_ && yaw_rate_->utime != 0 && young(*yaw_rate_, utime)) {
+    const std::optional<double>& value = yaw_rate_->value;
+    if (value && std::abs(*value) <= config_.max_yaw_rate) sample.yaw_rate = value;
+  }
   wheels_t message = to_message(sample);
   if (outputs.publish(config_.channel, message)) {
     ++published_;

@@ -24,6 +24,7 @@ struct WheelDriverConfig {
   std::optional<CanSignal> yaw_rate;  ///< rad/s, positive to the left
   double max_age = 0.1;               ///< s; signals of one message are no further apart
   double max_speed = 120.0;           ///< m/s; a faster wheel is an error
+  double max_yaw_rate = 10.0;         ///< rad/s; a faster turn is an error, and no yaw rate
 };
 
 template <class Visitor>
@@ -40,6 +41,7 @@ void visit(WheelDriverConfig& c, Visitor& v) {
   v.optional_group("yaw_rate", c.yaw_rate);
   v.number("max_age_s", c.max_age, 1e-3, 10.0);
   v.number("max_speed_mps", c.max_speed, 1.0, 1000.0);
+  v.number("max_yaw_rate_radps", c.max_yaw_rate, 0.1, 1000.0);
 }
 
 class WheelDriver : public SensorDriver {

@@ -6,6 +6,7 @@
 #include "drivers/gnss_driver/handler.h"
 #include "drivers/protocols/utc.h"
 #include "support/driver_run.h"
+#include "support/receiver_bytes.h"
 
 namespace roadfix {
 namespace {
@@ -16,42 +17,14 @@ using test::RawRead;
 const int64_t kStart = *utc_us(2024, 5, 3, 23, 59, 58);  // over midnight
 constexpr int64_t kPath_us = 40'000;                     // from validity to the first byte read
 
-Bytes pvt(int64_t utc, uint32_t tow_ms, double lat_deg) {
-  const int64_t day_us = utc - *utc_us(2024, 5, 3, 0, 0, 0);
-  const int64_t s = day_us / 1'000'000;
-  test::Payload p(92);
-  p.at<uint32_t>(0, tow_ms).at<uint16_t>(4, 2024).at<uint8_t>(6, 5).at<uint8_t>(7, static_cast<uint8_t>(3 + s / 86400));
-  p.at<uint8_t>(8, static_cast<uint8_t>(s / 3600 % 24)).at<uint8_t>(9, static_cast<uint8_t>(s / 60 % 60));
-  p.at<uint8_t>(10, static_cast<uint8_t>(s % 60))
-      .at<uint8_t>(11, 3)
-      .at<int32_t>(16, static_cast<int32_t>(day_us % 1'000'000) * 1000);
-  p.at<uint8_t>(20, 3).at<uint8_t>(21, 0x83).at<uint8_t>(23, 17);  // 3D, corrections, ambiguities fixed
-  p.at<int32_t>(24, -32'500'000).at<int32_t>(28, static_cast<int32_t>(lat_deg * 1e7)).at<int32_t>(32, 167'500);
-  p.at<int32_t>(36, 120'000).at<uint32_t>(40, 14).at<uint32_t>(44, 20);
-  p.at<int32_t>(48, 1000)
-      .at<int32_t>(52, 2000)
-      .at<int32_t>(56, -300)
-      .at<uint32_t>(68, 50)
-      .at<uint16_t>(76, 145)
-      .at<uint8_t>(78, 1U << 2U);
-  return test::ubx_bytes(1, 7, p.bytes());
-}
-
-Bytes relposned(uint32_t tow_ms, double heading_deg) {
-  test::Payload p(64);
-  p.at<uint8_t>(0, 1).at<uint32_t>(4, tow_ms).at<int32_t>(24, static_cast<int32_t>(heading_deg * 1e5));
-  p.at<uint32_t>(52, 20'000).at<uint32_t>(60, (1U << 2U) | (2U << 3U) | (1U << 5U) | (1U << 8U));
-  return test::ubx_bytes(1, 0x3C, p.bytes());
-}
-
 /// 5 Hz; each epoch in one read, as late as the path is.
 std::vector<RawRead> ubx_drive(int epochs, bool with_heading) {
   std::vector<RawRead> reads;
   for (int i = 0; i < epochs; ++i) {
     const int64_t utc = kStart + int64_t{200'000} * i;
     const auto tow = static_cast<uint32_t>(1000 + 200 * i);
-    Bytes bytes = pvt(utc, tow, 48.0 + 1e-5 * i);
-    if (with_heading) test::append(bytes, relposned(tow, 100.0));
+    Bytes bytes = test::pvt_bytes(utc, tow, 48.0 + 1e-5 * i);
+    if (with_heading) test::append(bytes, test::relposned_bytes(tow, 100.0));
     reads.push_back({utc + kPath_us, bytes});
   }
   return reads;
@@ -129,25 +102,11 @@ TEST_CASE("UBX: a heading that stops coming holds up three fixes at most") {
   CHECK(count[9] == 10);  // does not wait any more
 }
 
-Bytes nmea_epoch(int64_t utc, bool gst, const std::string& quality, const std::string& heights) {
-  const int64_t s = utc / 1'000'000 % 86'400;
-  char time[16];
-  std::snprintf(time, sizeof time, "%02d%02d%02d.%02d", static_cast<int>(s / 3600), static_cast<int>(s / 60 % 60),
-                static_cast<int>(s % 60), static_cast<int>(utc / 10'000 % 100));
-  const std::string t = time;
-  Bytes bytes = test::nmea_bytes("GNRMC," + t + ",A,4800.0000,N,00315.0000,W,19.438445,270.0,030524,,,A");
-  test::append(bytes,
-               test::nmea_bytes("GNGGA," + t + ",4800.0000,N,00315.0000,W," + quality + ",12,1.5," + heights + ",,"));
-  test::append(bytes, test::nmea_bytes("GNGSA,A,3,,,,,,,,,,,,,2.5,1.5,2.0"));
-  if (gst) test::append(bytes, test::nmea_bytes("GNGST," + t + ",1,,,,0.3,0.4,0.9"));
-  return bytes;
-}
-
 std::vector<gnss_t> nmea_fixes(bool gst, const std::string& quality, const std::string& heights) {
   std::vector<RawRead> reads;
   for (int i = 0; i < 20; ++i) {
     const int64_t utc = kStart + int64_t{200'000} * i;
-    reads.push_back({utc + kPath_us, nmea_epoch(utc, gst, quality, heights)});
+    reads.push_back({utc + kPath_us, test::nmea_epoch_bytes(utc, gst, quality, heights)});
   }
   GnssDriverConfig c = config();
   c.latency = 1e-6 * kPath_us;
@@ -191,7 +150,7 @@ TEST_CASE("NMEA beside UBX is not a second fix") {
   std::vector<RawRead> reads = ubx_drive(10, false);
   for (int i = 0; i < 10; ++i)
     test::append(reads[static_cast<std::size_t>(i)].bytes,
-                 nmea_epoch(kStart + int64_t{200'000} * i, true, "1", "1,M,1,M"));
+                 test::nmea_epoch_bytes(kStart + int64_t{200'000} * i, true, "1", "1,M,1,M"));
   CHECK(test::run_driver_over(driver, reads).sent.size() == 10);
 }
 
@@ -214,7 +173,7 @@ TEST_CASE("the computer's clock may be wrong: mapped stamps follow it, utc ones 
 TEST_CASE("however the stream is cut, the messages are the same but for the times of reading") {
   Bytes stream;
   for (const RawRead& read : ubx_drive(3, true)) test::append(stream, read.bytes);
-  test::append(stream, nmea_epoch(kStart, true, "1", "1,M,1,M"));
+  test::append(stream, test::nmea_epoch_bytes(kStart, true, "1", "1,M,1,M"));
   GnssDriverConfig c = config();
   c.time = GnssTime::kUtc;
   c.max_clock_error = 10.0;

@@ -4,8 +4,8 @@
 #include <roadfix/pose_t.hpp>
 
 #include "drivers/imu_driver/handler.h"
-#include "geometry/frames.h"
 #include "support/driver_run.h"
+#include "support/sbg_logs.h"
 
 namespace roadfix {
 namespace {
@@ -14,14 +14,6 @@ using test::Bytes;
 using test::RawRead;
 
 constexpr int64_t kStart = 1'700'000'000'000'000;
-
-Bytes imu(uint32_t t_us, uint16_t status = 0x03FF) {
-  test::Payload p(32);
-  p.at<uint32_t>(0, t_us).at<uint16_t>(4, status);
-  p.at<int32_t>(6, 1048576).at<int32_t>(10, 2 * 1048576).at<int32_t>(14, -10 * 1048576);  // forward, right, down
-  p.at<int32_t>(18, 6710886).at<int32_t>(22, 13421773).at<int32_t>(26, -20132659);
-  return test::sbg_bytes(kSbgImuShort, p.bytes());
-}
 
 ImuDriverConfig config() {
   ImuDriverConfig c;
@@ -33,7 +25,7 @@ TEST_CASE("IMU_SHORT comes out in x forward, y left, z up, and its stamps go on 
   std::vector<RawRead> reads;
   const uint32_t first = 4'294'000'000U;  // the counter wraps after a second
   for (uint32_t i = 0; i < 1000; ++i)
-    reads.push_back({kStart + 5000 * i + (i * 7919U) % 3000U, imu(first + 5000U * i)});
+    reads.push_back({kStart + 5000 * i + (i * 7919U) % 3000U, test::sbg_imu_bytes(first + 5000U * i)});
   ImuDriver driver(config());
   const auto samples = test::run_driver_over(driver, reads).on<imu_t>("IMU");
   REQUIRE(samples.size() > 990);  // the first ones may be stamped late
@@ -51,29 +43,16 @@ TEST_CASE("IMU_SHORT comes out in x forward, y left, z up, and its stamps go on 
 
 TEST_CASE("a sensor that fails its own test is refused and counted") {
   ImuDriver driver(config());
-  CHECK(test::run_driver_over(driver, {{kStart, imu(1000, 0x03FE)}, {kStart + 5000, imu(6000)}}).sent.size() == 1);
+  CHECK(test::run_driver_over(driver,
+                              {{kStart, test::sbg_imu_bytes(1000, 0x03FE)}, {kStart + 5000, test::sbg_imu_bytes(6000)}})
+            .sent.size() == 1);
   CHECK(driver.counters().back().refused == 1);
 }
 
 TEST_CASE("GPS1_POS, GPS1_VEL and GPS1_HDT of one moment make one fix") {
   std::vector<RawRead> reads;
   for (uint32_t i = 0; i < 10; ++i) {
-    const uint32_t t = 1'000'000 + 200'000 * i, tow = 200 * i;
-    test::Payload pos(57), vel(44), hdt(26);
-    pos.at<uint32_t>(0, t).at<uint32_t>(4, 6U << 6U).at<uint32_t>(8, tow).at<double>(12, 48.5).at<double>(20, 179.999);
-    pos.at<double>(28, 120.0).at<float>(36, 47.5F).at<float>(40, 0.25F).at<float>(44, 0.5F).at<float>(48, 1.0F);
-    pos.at<uint8_t>(52, 14).at<uint16_t>(55, 0xFFFF);
-    vel.at<uint32_t>(0, t)
-        .at<uint32_t>(4, 2U << 6U)
-        .at<uint32_t>(8, tow)
-        .at<float>(12, 1.0F)
-        .at<float>(16, 2.0F)
-        .at<float>(20, 3.0F);
-    vel.at<float>(24, 0.1F).at<float>(28, 0.2F).at<float>(32, 0.3F);
-    hdt.at<uint32_t>(0, t).at<uint32_t>(6, tow).at<float>(10, 30.0F).at<float>(14, 0.5F);
-    Bytes bytes = test::sbg_bytes(kSbgGps1Vel, vel.bytes());
-    test::append(bytes, test::sbg_bytes(kSbgGps1Pos, pos.bytes()));
-    test::append(bytes, test::sbg_bytes(kSbgGps1Hdt, hdt.bytes()));
+    const Bytes bytes = test::sbg_gps_bytes(1'000'000 + 200'000 * i, 200 * i);
     reads.push_back({kStart + 200'000 * int64_t{i}, bytes});
   }
   ImuDriverConfig c = config();
@@ -103,16 +82,7 @@ TEST_CASE("GPS1_POS, GPS1_VEL and GPS1_HDT of one moment make one fix") {
 
 TEST_CASE("EKF_QUAT with EKF_NAV is a pose in east, north, up of the vehicle's axes") {
   // Heading east, level: body x (forward) is east, y (right) is south. Driving north-east at 1, 2 m/s.
-  test::Payload quat(36), nav(72);
-  const double half = 45.0 * kDegree;
-  quat.at<uint32_t>(0, 5000)
-      .at<float>(4, static_cast<float>(std::cos(half)))
-      .at<float>(16, static_cast<float>(std::sin(half)));
-  nav.at<uint32_t>(0, 5000).at<float>(4, 1.0F).at<float>(8, 2.0F).at<double>(28, 48.0).at<double>(36, 2.0).at<double>(
-      44, 100.0);
-  nav.at<float>(52, 44.0F).at<float>(56, 0.1F).at<float>(60, 0.2F).at<float>(64, 0.3F).at<uint32_t>(68, 0xF4);
-  Bytes bytes = test::sbg_bytes(kSbgEkfQuat, quat.bytes());
-  test::append(bytes, test::sbg_bytes(kSbgEkfNav, nav.bytes()));
+  const Bytes bytes = test::sbg_solution_bytes(5000);
   ImuDriverConfig c = config();
   c.solution_channel = "REFERENCE";
   ImuDriver driver(c);

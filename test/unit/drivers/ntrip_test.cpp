@@ -105,5 +105,23 @@ TEST_CASE("refusals are told in plain words") {
   CHECK(why(std::string(9000, 'x')) == "answers no line");
 }
 
+// Found by the fuzz target "corrections": a long head passed in one piece and was refused in two.
+TEST_CASE("a head that is too long is refused in whatever pieces it comes") {
+  const std::string filler(NtripAnswer::kMaxHead, 'x');
+  for (const std::string& text : {"HTTP/1.1 200 OK\r\nX: " + filler + "\r\n\r\n", filler + "\r\n",
+                                  "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n1;" + filler + "\r\n"}) {
+    const Bytes bytes = test::bytes_of(text);
+    for (const std::size_t cut : {std::size_t{0}, NtripAnswer::kMaxHead - 1, NtripAnswer::kMaxHead, bytes.size() - 1}) {
+      NtripAnswer answer;
+      CHECK(corrections(answer, bytes, cut).empty());
+      CHECK(answer.state() == NtripAnswer::State::kRefused);
+      CHECK(answer.waiting_bytes() == 0);
+    }
+  }
+  NtripAnswer longest;  // teeth: one that just fits
+  corrections(longest, test::bytes_of("HTTP/1.1 200 OK\r\nX: " + filler.substr(24) + "\r\n\r\n"), 5000);
+  CHECK(longest.state() == NtripAnswer::State::kStreaming);
+}
+
 }  // namespace
 }  // namespace roadfix
