@@ -45,7 +45,8 @@ class Bus {
   /// `channels`: a regular expression over the whole name, as LCM takes it.
   virtual void subscribe(const std::string& channels, Handler handler, const QueuePolicy& policy = {}) = 0;
 
-  /// Throws BusError where the message cannot be sent.
+  /// What the network does not take now (a cable pulled, a route gone) is counted in unsent(): the process goes on.
+  /// Throws BusError where the message could never be sent.
   virtual void publish(const std::string& channel, std::span<const uint8_t> bytes) = 0;
 
   /// Waits up to `patience` for a message, then hands out all that are there, in the order of their arrival.
@@ -54,6 +55,9 @@ class Bus {
 
   /// Per subscription, in the order of subscribe().
   [[nodiscard]] virtual std::vector<QueueStatus> queues() const { return {}; }
+
+  /// Messages of publish() that the network did not take.
+  [[nodiscard]] virtual int64_t unsent() const { return 0; }
 
   /// Datagrams that the kernel dropped at our socket since it was opened.
   [[nodiscard]] virtual int64_t kernel_drops() const { return 0; }

@@ -1,9 +1,11 @@
 #include "bus/network_bus.h"
 
+#include <cerrno>
 #include <lcm/lcm-cpp.hpp>
 #include <new>
 
 #include "bus/log_file.h"
+#include "bus/message.h"
 #include "bus/udp_socket.h"
 
 namespace roadfix {
@@ -74,9 +76,10 @@ void NetworkBus::subscribe(const std::string& channels, Handler handler, const Q
 
 void NetworkBus::publish(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel.empty() || channel.size() > kMaxChannelBytes) throw BusError("no channel name: '" + channel + "'");
-  if (lcm_->publish(channel, bytes.data(), static_cast<unsigned>(bytes.size())) != 0) {
-    throw BusError("cannot publish on " + channel);
-  }
+  if (bytes.size() > kMaxMessageBytes) throw BusError(channel + ": " + std::to_string(bytes.size()) + " bytes");
+  // Of a message in several datagrams LCM says that it was sent even where the system refused them; errno does not.
+  errno = 0;
+  if (lcm_->publish(channel, bytes.data(), static_cast<unsigned>(bytes.size())) != 0 || errno != 0) ++unsent_;
 }
 
 /// Called from LCM's C code: lets nothing through but a count.

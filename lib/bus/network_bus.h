@@ -31,6 +31,7 @@ class NetworkBus : public Bus {
   void publish(const std::string& channel, std::span<const uint8_t> bytes) override;
   bool handle(std::chrono::milliseconds patience) override;
   [[nodiscard]] std::vector<QueueStatus> queues() const override;
+  [[nodiscard]] int64_t unsent() const override { return unsent_; }
   [[nodiscard]] int64_t kernel_drops() const override;
 
   /// What the kernel gave our socket, in the bytes that were asked for; 0 before the first subscribe() and where the
@@ -55,6 +56,7 @@ class NetworkBus : public Bus {
   std::deque<Waiting> queue_;
   std::vector<std::vector<uint8_t>> free_;
   int port_ = 0;
+  int64_t unsent_ = 0;
 };
 
 }  // namespace roadfix

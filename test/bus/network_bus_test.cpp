@@ -3,6 +3,7 @@
 #include "bus/network_bus.h"
 
 #include <catch2/catch.hpp>
+#include <cstdlib>
 
 using namespace roadfix;
 
@@ -63,4 +64,21 @@ TEST_CASE("a bus that cannot be opened or used says why") {
   NetworkBus bus(kUrl);
   REQUIRE_THROWS_AS(bus.publish("", std::vector<uint8_t>(3)), BusError);
   REQUIRE_THROWS_AS(bus.publish(std::string(64, 'x'), std::vector<uint8_t>(3)), BusError);
+}
+
+TEST_CASE("a network that is gone costs the messages of that time, which are counted, and nothing else") {
+  NetworkBus from(kUrl), to(kUrl);
+  std::vector<uint8_t> seen;
+  to.subscribe("D", [&](const BusMessage& message) { seen.push_back(message.bytes[0]); });
+  publish(from, "D", 3, 100);
+  REQUIRE(handle_until(to, [&] { return seen.size() == 3; }));
+  REQUIRE(from.unsent() == 0);
+  REQUIRE(std::system("ip route del 224.0.0.0/4 dev lo") == 0);
+  publish(from, "D", 5, 100);
+  publish(from, "D", 1, 200'000);  // in many datagrams
+  REQUIRE(from.unsent() == 6);
+  REQUIRE(std::system("ip route add 224.0.0.0/4 dev lo") == 0);
+  publish(from, "D", 4, 100);
+  REQUIRE(handle_until(to, [&] { return seen.size() == 7; }));
+  REQUIRE(from.unsent() == 6);
 }
