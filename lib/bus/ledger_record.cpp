@@ -52,12 +52,12 @@ bool LedgerRecord::accepts(int input, const EventId& id) const {
   return !excludes(input, id) && !unsettled_at_end(input, id);
 }
 
-void LedgerRecord::end_with(int64_t last_utime, const provenance_t& provenance, std::vector<int64_t> applied_utime) {
+void LedgerRecord::end_with(int64_t last_utime, const provenance_t& provenance, std::vector<int64_t> applied_utime,
+                            int64_t lateness_us) {
   last_utime_ = last_utime;
   applied_utime_ = std::move(applied_utime);
   last_seq_ = provenance.last_seq;
-  lateness_us_ = 0;
-  for (const InputSpec& input : spec_.inputs) lateness_us_ = std::max(lateness_us_, input.lateness_us);
+  lateness_us_ = lateness_us;
 }
 
 bool LedgerRecord::unsettled_at_end(int input, const EventId& id) const {

@@ -27,8 +27,9 @@ class LedgerRecord : public Precedent {
   /// passed, but that lie behind the last ones applied, were not there in time; nor were older ones of a channel of
   /// which none was ever applied; nor what has later numbers and much older stamps than the last ones applied: the
   /// stamps went back, and another run of the stage took it. `applied_utime`: per input, of the last one applied, as
-  /// far as the log has it.
-  void end_with(int64_t last_utime, const provenance_t& provenance, std::vector<int64_t> applied_utime);
+  /// far as the log has it; `lateness_us`: what the horizon allowed then.
+  void end_with(int64_t last_utime, const provenance_t& provenance, std::vector<int64_t> applied_utime,
+                int64_t lateness_us);
 
   [[nodiscard]] bool accepts(int input, const EventId& id) const override;
   [[nodiscard]] bool changes_clock(int input, const EventId& id) const override;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <roadfix/config_t.hpp>
+#include <roadfix/horizon_t.hpp>
 
 namespace roadfix {
 
@@ -12,6 +13,8 @@ constexpr int64_t kConfig_us = 10'000'000;
 constexpr int64_t kLook_us = 100'000;
 /// What a message caused (two publishers, an overload) is told for this long.
 constexpr int64_t kTrouble_us = 700'000;
+/// And what was not sent until some heartbeats have come through again.
+constexpr int64_t kUnsent_us = 3'000'000;
 /// Without a tick for this long a stage says so; shorter gaps are ordinary.
 constexpr int64_t kNoClock_us = 1'000'000;
 /// So many clock samples in a row, all that much older than the clock: the stamps have gone back (a log played again, a
@@ -24,7 +27,8 @@ LiveStage::LiveStage(std::function<std::unique_ptr<Stage>()> make, Bus& bus)
     : bus_(bus),
       make_(std::move(make)),
       runner_(std::make_unique<StageRunner>(make_(), *this)),
-      overload_(runner_->spec().overload) {
+      overload_(runner_->spec().overload),
+      lateness_(runner_->spec().inputs) {
   runner_->measure_time();
   started_us_ = clock_.now_utime();
   const std::vector<InputSpec>& inputs = runner_->spec().inputs;
@@ -44,8 +48,14 @@ void LiveStage::take(int input, std::span<const uint8_t> bytes) {
       return;
     }
   }
-  if (memory_ && header && is_plausible(*header) && is_clock(input)) recall(header->utime);
+  if (header && is_plausible(*header) && is_clock(input)) {
+    if (memory_) recall(header->utime);
+    begin_horizon(header->utime);
+  }
   const Offer offer = runner_->offer(input, bytes);
+  if ((offer == Offer::kWaits || offer == Offer::kLate) && input != horizon_input(runner_->spec())) {
+    watch_lateness(input, header->utime);
+  }
   if (offer == Offer::kTick) {
     last_tick_us_ = clock_.now_utime();
     behind_ = 0;
@@ -66,15 +76,38 @@ void LiveStage::remember_in(const std::filesystem::path& file) {
 
 /// As old as the horizon will be after the first clock sample: the first input to be applied.
 void LiveStage::recall(int64_t first_utime) {
-  int64_t lateness_us = 0;
-  for (const InputSpec& input : runner_->spec().inputs) lateness_us = std::max(lateness_us, input.lateness_us);
-  memory_->utime = first_utime - lateness_us;
+  memory_->utime = first_utime - largest_lateness_us(runner_->spec().inputs);
   memory_->run = clock_.run();
   memory_->seq = 0;
   const std::vector<uint8_t> bytes = encode(*memory_);
   memory_.reset();
   bus_.publish(stage_channel("START_", runner_->spec().name), bytes);
   runner_->offer(memory_input(runner_->spec()), bytes);
+}
+
+/// Counts from the second clock sample on; without such an input in the log, replay allows the largest lateness.
+void LiveStage::begin_horizon(int64_t first_utime) {
+  if (horizon_run_ || horizon_input(runner_->spec()) < 0) return;
+  horizon_run_ = clock_.now_utime();
+  allow_lateness(first_utime - largest_lateness_us(runner_->spec().inputs), lateness_.allowed_us());
+}
+
+void LiveStage::allow_lateness(int64_t utime, int64_t lateness_us) {
+  horizon_t horizon{};
+  horizon.utime = utime;
+  horizon.run = *horizon_run_;
+  horizon.seq = horizon_seq_++;
+  horizon.lateness_us = lateness_us;
+  const std::vector<uint8_t> bytes = encode(horizon);
+  bus_.publish(stage_channel("HORIZON_", runner_->spec().name), bytes);
+  runner_->offer(horizon_input(runner_->spec()), bytes);
+}
+
+void LiveStage::watch_lateness(int input, int64_t utime) {
+  const std::optional<int64_t> now = runner_->stream().clock_utime();
+  if (!horizon_run_ || !now) return;
+  lateness_.note(input, *now, utime);
+  if (const std::optional<int64_t> lateness_us = lateness_.change(*now)) allow_lateness(*now, *lateness_us);
 }
 
 void LiveStage::remember() {
@@ -110,6 +143,9 @@ void LiveStage::begin_again(int64_t utime) {
   while (runs_.contains(name)) ++name;
   runner_->name_run(name);
   overload_ = OverloadChoice(runner_->spec().overload);
+  lateness_ = LatenessWatch(runner_->spec().inputs);
+  horizon_run_.reset();
+  begin_horizon(utime);
   behind_ = 0;
   began_because_ = "the stamps went back by " + std::to_string(back_us / 1'000'000) + " s: a new run";
 }
@@ -165,6 +201,11 @@ void LiveStage::note_trouble(int64_t now_utime) {
       trouble_until_us_ = now_utime + kTrouble_us;
     }
     counted_[i] = counters;
+  }
+  if (const int64_t unsent = bus_.unsent(); unsent > unsent_) {
+    trouble_ = "the network did not take " + std::to_string(unsent) + " messages";
+    trouble_until_us_ = now_utime + kUnsent_us;
+    unsent_ = unsent;
   }
 }
 

@@ -2,7 +2,8 @@
 ///
 /// The wall clock is read for heartbeats and configuration messages only; what the stage computes is the runner's, and
 /// so the same as in replay. What it decides by arrival (which frames to skip under overload, when to begin again) the
-/// ledger tells.
+/// ledger tells; how late its inputs may be, where the stage asks for that (horizon_input()), it says in a message that
+/// is an input as well.
 #pragma once
 
 #include <filesystem>
@@ -17,6 +18,7 @@
 #include "bus/run_clock.h"
 #include "bus/stage_memory.h"
 #include "bus/stage_runner.h"
+#include "stream/lateness_watch.h"
 #include "stream/overload_choice.h"
 
 namespace roadfix {
@@ -44,6 +46,9 @@ class LiveStage : public MessageSink {
   [[nodiscard]] bool is_clock(int input) const;
   void begin_again(int64_t utime);
   void recall(int64_t first_utime);
+  void begin_horizon(int64_t first_utime);
+  void allow_lateness(int64_t utime, int64_t lateness_us);
+  void watch_lateness(int input, int64_t utime);
   void remember();
   void publish_due();
   void publish_heartbeat(int64_t now_utime, bool stopping);
@@ -58,6 +63,9 @@ class LiveStage : public MessageSink {
   std::function<std::unique_ptr<Stage>()> make_;
   std::unique_ptr<StageRunner> runner_;
   OverloadChoice overload_;
+  LatenessWatch lateness_;
+  std::optional<int64_t> horizon_run_;  ///< of our messages on HORIZON_<PROCESS>; none before the first clock sample
+  int64_t horizon_seq_ = 0;
   int64_t behind_ = 0;         ///< clock samples in a row that are far behind the clock
   std::string began_because_;  ///< of the run, where it is not the first
   std::set<int64_t> runs_;     ///< names given before
@@ -67,6 +75,7 @@ class LiveStage : public MessageSink {
   int64_t started_us_ = 0;
   int64_t last_tick_us_ = 0;            ///< of the run clock, when the newest tick came
   std::vector<InputCounters> counted_;  ///< at the last look
+  int64_t unsent_ = 0;                  ///< at the last look
   std::string trouble_;
   int64_t trouble_until_us_ = 0;
   int8_t told_state_ = -1;

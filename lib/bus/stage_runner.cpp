@@ -2,6 +2,7 @@
 
 #include <cctype>
 #include <cstring>
+#include <roadfix/horizon_t.hpp>
 #include <stdexcept>
 
 namespace roadfix {
@@ -19,6 +20,14 @@ std::vector<std::string> handler_names(const StageSpec& spec) {
 
 }  // namespace
 
+int horizon_input(const StageSpec& spec) {
+  const std::string channel = stage_channel("HORIZON_", spec.name);
+  for (std::size_t i = 0; i < spec.inputs.size(); ++i) {
+    if (spec.inputs[i].channel == channel && spec.inputs[i].type == "horizon_t") return static_cast<int>(i);
+  }
+  return -1;
+}
+
 int delivery_order(const StageSpec& spec, int input) {
   for (std::size_t i = 0; i < spec.clocks.size(); ++i) {
     if (spec.clocks[i].input == input) return static_cast<int>(spec.clocks.size() - i);
@@ -28,6 +37,7 @@ int delivery_order(const StageSpec& spec, int input) {
 
 StageRunner::StageRunner(std::unique_ptr<Stage> stage, MessageSink& sink)
     : stage_(std::move(stage)),
+      horizon_input_(horizon_input(stage_->spec())),
       sink_(sink),
       stream_(stage_->spec().inputs, stage_->spec().clocks),
       next_seq_(stage_->spec().outputs.size()),
@@ -82,8 +92,7 @@ void StageRunner::tick(const Message& sample) {
   }
   if (stream_.resumes_at()) return;  // published by the run that the state is from
   while (const WaitingInput* waiting = stream_.next()) {
-    const HandlerTiming::Scope scope(timing_.get(), static_cast<std::size_t>(waiting->input));
-    stage_->apply({waiting->input, waiting->id.utime, waiting->id.run, waiting->id.seq, waiting->bytes});
+    apply(*waiting);
   }
   stream_.close_tick();
   now_utime_ = sample.utime;
@@ -94,6 +103,15 @@ void StageRunner::tick(const Message& sample) {
     stage_->publish(now_utime_, *this);
   }
   publish_state_if_due();
+}
+
+void StageRunner::apply(const WaitingInput& waiting) {
+  const HandlerTiming::Scope scope(timing_.get(), static_cast<std::size_t>(waiting.input));
+  if (waiting.input == horizon_input_) {
+    stream_.allow_lateness(decode<horizon_t>(waiting.bytes).lateness_us);
+    return;
+  }
+  stage_->apply({waiting.input, waiting.id.utime, waiting.id.run, waiting.id.seq, waiting.bytes});
 }
 
 Header StageRunner::stamp(int output) {

@@ -64,11 +64,13 @@ class StageRunner : private Outputs {
 
   [[nodiscard]] std::optional<EventId> check(int input, std::span<const uint8_t> bytes);
   void tick(const Message& sample);
+  void apply(const WaitingInput& waiting);
   void publish_ledger();
   void publish_state_if_due();
   void publish_state();
 
   std::unique_ptr<Stage> stage_;
+  int horizon_input_ = -1;
   MessageSink& sink_;
   InputStream stream_;
   std::vector<MessageCheck> checks_;
@@ -94,6 +96,10 @@ int delivery_order(const StageSpec& spec, int input);
 /// Data time between two snapshots. Together with the largest lateness and the feedback's delay it stays below the 10 s
 /// that a loss by the logger may cost.
 constexpr int64_t kSnapshot_us = 9'000'000;
+
+/// The input that tells how late the others may be, of type horizon_t on HORIZON_<PROCESS>, which the runner takes
+/// itself; -1 where the stage declares none: its horizon stays the largest lateness behind the clock.
+int horizon_input(const StageSpec& spec);
 
 /// "LEDGER_" + GNSS_INS_EKF: the channels that every stage has beside its outputs.
 std::string stage_channel(const std::string& prefix, const std::string& stage_name);

@@ -10,7 +10,7 @@ namespace roadfix {
 namespace {
 
 /// Of the bytes in state_t::state that are the runner's; the stage's own layout is in the message.
-constexpr int64_t kRunnerLayout = 2;
+constexpr int64_t kRunnerLayout = 3;
 
 /// Data time after which the entries of the last minute are published again.
 constexpr int64_t kRepeatLedger_us = 5'000'000;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <roadfix/horizon_t.hpp>
 #include <tuple>
 
 #include "bus/output_difference.h"
@@ -69,12 +70,15 @@ void RunVerifier::end_ledger() {
   const std::optional<provenance_t> provenance = read_provenance(type, last.bytes);
   if (!provenance) return;
   std::vector<int64_t> applied_utime(provenance->last_seq.size(), kNever + kMargin_us);
+  int64_t lateness_us = largest_lateness_us(spec_.inputs);
   for (const LoggedInput& logged : log_.inputs) {
     const auto i = static_cast<std::size_t>(logged.input);
     const bool applied = i < applied_utime.size() && logged.id.seq == provenance->last_seq[i];
-    if (applied && logged.id.run == run_.ledger.newest_run(logged.input)) applied_utime[i] = logged.id.utime;
+    if (!applied || logged.id.run != run_.ledger.newest_run(logged.input)) continue;
+    applied_utime[i] = logged.id.utime;
+    if (logged.input == horizon_input(spec_)) lateness_us = decode<horizon_t>(logged.bytes).lateness_us;
   }
-  run_.ledger.end_with(last.header.utime, *provenance, std::move(applied_utime));
+  run_.ledger.end_with(last.header.utime, *provenance, std::move(applied_utime), lateness_us);
   std::map<int, std::pair<int64_t, int64_t>> unsettled;
   for (const LoggedInput& logged : log_.inputs) {
     if (!run_.ledger.unsettled_at_end(logged.input, logged.id) || run_.ledger.excludes(logged.input, logged.id))

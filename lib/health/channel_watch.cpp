@@ -23,8 +23,8 @@ constexpr double kStale = 1.0;    // s after which the stamps of a channel witho
 constexpr double kScatter = 3.0;  // standard deviations of the arrival that a slow channel may be overdue
 /// A rate this much above the expected one is the new expectation.
 constexpr double kFaster = 1.2;
-constexpr std::array<std::string_view, 9> kEventPrefixes = {"LEDGER_", "CONFIG_", "STATE_",     "START_", "HEARTBEAT_",
-                                                            "RAW_",    "HEALTH",  "VO_RESTART", "AIDING_"};
+constexpr std::array<std::string_view, 10> kEventPrefixes = {
+    "LEDGER_", "CONFIG_", "STATE_", "START_", "HORIZON_", "HEARTBEAT_", "RAW_", "HEALTH", "VO_RESTART", "AIDING_"};
 constexpr int64_t kTwoPublishers = 3;
 /// Of one gap; a forged number must not overflow the sum.
 constexpr int64_t kMostLost = 1'000'000'000;

@@ -16,7 +16,12 @@ constexpr std::size_t kMaxWaitingBytes = std::size_t{256} << 20;
 
 InputStream::InputStream(std::vector<InputSpec> inputs, std::vector<ClockSpec> clocks)
     : inputs_(std::move(inputs)), clock_(std::move(clocks)), tracks_(inputs_.size()) {
-  for (const InputSpec& input : inputs_) lateness_us_ = std::max(lateness_us_, input.lateness_us);
+  lateness_us_ = largest_lateness_us(inputs_);
+}
+
+void InputStream::allow_lateness(int64_t lateness_us) {
+  const int64_t most_us = largest_lateness_us(inputs_);
+  lateness_us_ = std::clamp(lateness_us, std::min(kLeastLateness_us, most_us), most_us);
 }
 
 Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> bytes) {

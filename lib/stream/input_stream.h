@@ -1,11 +1,11 @@
 /// Puts a stage's inputs in order: takes them as they arrive, gives them back when the horizon has reached them, and
 /// keeps the ledger of those that were not taken (DESIGN.md, section 4).
 ///
-/// horizon = clock - largest lateness. An input is applied once utime + effect delay <= horizon, in the order
-/// (utime + effect delay, rank, run, seq); one that arrives when the horizon is there already is late. So all channels
-/// but the clock may arrive in any order within the lateness, with the same result. Clock samples count in their own
-/// order: one that is not newer than the clock is refused.
-/// Reads no clock; time is what the data say.
+/// horizon = clock - lateness: the largest of the channels, or less where allow_lateness() says so. An input is applied
+/// once utime + effect delay <= horizon, in the order (utime + effect delay, rank, run, seq); one that arrives when the
+/// horizon is there already is late. So all channels but the clock may arrive in any order within the lateness, with
+/// the same result. Clock samples count in their own order: one that is not newer than the clock is refused. Reads no
+/// clock; time is what the data say.
 #pragma once
 
 #include <cstdint>
@@ -62,6 +62,10 @@ class InputStream {
 
   /// The next input that the horizon has reached; null when there is none. Valid until the next call.
   const WaitingInput* next();
+
+  /// From the next tick on the horizon is this far behind the clock, between kLeastLateness_us and the largest
+  /// lateness; where it grows, the horizon stands until the clock is ahead of it by so much.
+  void allow_lateness(int64_t lateness_us);
 
   /// After the last next() of a tick: numbers what the ledger has noted.
   void close_tick();

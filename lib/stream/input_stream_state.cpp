@@ -59,6 +59,7 @@ void InputStream::save(StateWriter& writer) const {
   for (const std::optional<int64_t>& utime : clock.leap_utime) writer.put(utime);
   writer.put(run_);
   writer.put(horizon_);
+  writer.put(lateness_us_);
   writer.put(digest_);
   writer.put(ledger_total());
   writer.put(static_cast<int64_t>(ticks_ahead_.size()));
@@ -87,6 +88,7 @@ void InputStream::load(StateReader& reader) {
   clock_.restore(clock);
   reader.get(run_);
   reader.get(horizon_);
+  allow_lateness(reader.get<int64_t>());
   reader.get(digest_);
   ledger_.start_at(reader.get<int64_t>());
   ticks_ahead_.clear();

@@ -1,6 +1,7 @@
 /// What a stage declares about its inputs.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -25,6 +26,14 @@ struct OverloadSpec {
   std::vector<int> inputs;
   int64_t patience = 2;  ///< newer ones that may wait before skipping begins
 };
+
+/// What a horizon may be behind the clock: the most, where nothing else was said; and at least, whatever was measured.
+inline int64_t largest_lateness_us(const std::vector<InputSpec>& inputs) {
+  int64_t largest_us = 0;
+  for (const InputSpec& input : inputs) largest_us = std::max(largest_us, input.lateness_us);
+  return largest_us;
+}
+inline constexpr int64_t kLeastLateness_us = 100'000;
 
 /// Names one message of a channel and says when it is valid.
 struct EventId {

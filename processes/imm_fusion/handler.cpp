@@ -47,11 +47,9 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0},
-                    {"POSE_INS", "pose_t", 0, 0},
-                    {"VO_STATUS", "vo_status_t", 200'000, 0},
-                    {"POSE_VO", "pose_t", 200'000, 0},
-                    {"POSE_WHEEL", "pose_t", 50'000, 0}};
+    spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0}, {"POSE_INS", "pose_t", 0, 0},
+                    {"VO_STATUS", "vo_status_t", 200'000, 0},  {"POSE_VO", "pose_t", 200'000, 0},
+                    {"POSE_WHEEL", "pose_t", 50'000, 0},       {"HORIZON_IMM_FUSION", "horizon_t", 0, 0}};
     spec_.clocks = {{kPoseIns, 300'000}, {kPoseVo, 600'000}, {kPoseWheel, 300'000}};
     spec_.outputs = {{"POSE_FUSED", "pose_t"},
                      {"POSE_LOCAL", "pose_t"},

@@ -18,7 +18,7 @@ constexpr std::array<const char*, 11> kSources = {"GNSS position", "GNSS velocit
 
 using Row = std::pair<const char*, const char*>;
 /// The first prefix that fits.
-constexpr std::array<Row, 20> kTypes = {{{"IMU", "imu_t"},
+constexpr std::array<Row, 21> kTypes = {{{"IMU", "imu_t"},
                                          {"GNSS", "gnss_t"},
                                          {"WHEELS", "wheels_t"},
                                          {"MAG", "mag_t"},
@@ -37,6 +37,7 @@ constexpr std::array<Row, 20> kTypes = {{{"IMU", "imu_t"},
                                          {"LEDGER_", "ledger_t"},
                                          {"STATE_", "state_t"},
                                          {"START_", "state_t"},
+                                         {"HORIZON_", "horizon_t"},
                                          {"CONFIG_", "config_t"}}};
 
 ProcessState process_state(int8_t code) {

@@ -18,7 +18,7 @@ namespace {
 using namespace roadfix;
 
 constexpr std::size_t kPoseVo = 3;  // of imm_fusion's inputs
-constexpr std::size_t kFusionInputs = 5;
+constexpr std::size_t kFusionInputs = 6;
 
 double percentile(std::vector<int64_t> values, double share) {
   if (values.empty()) return -1.0;
@@ -31,6 +31,9 @@ struct Latencies {
   std::map<int64_t, int64_t> imu_at, picture_at;  // by utime
   std::map<int64_t, int64_t> vo_picture_at;       // by seq of POSE_VO: arrival of its picture
   std::vector<int64_t> imu_us, camera_us;
+  std::vector<int64_t> tracker_us;   // from the picture's arrival to that of its POSE_VO
+  std::vector<int64_t> lateness_us;  // of POSE_VO, behind the newest POSE_INS there
+  int64_t newest_ins_utime = 0;
 
   void take(const LogEvent& event, const MessageCheck& is_pose) {
     const std::optional<Header> header = read_header(event.data);
@@ -41,10 +44,15 @@ struct Latencies {
       const auto imu = imu_at.find(header->utime);
       if (imu != imu_at.end()) imu_us.push_back(event.timestamp_us - imu->second);
       imu_at.erase(imu_at.begin(), imu_at.upper_bound(header->utime));
+      newest_ins_utime = std::max(newest_ins_utime, header->utime);
     }
     if (event.channel == "POSE_VO") {
       const auto picture = picture_at.find(header->utime);
-      if (picture != picture_at.end()) vo_picture_at[header->seq] = picture->second;
+      if (picture != picture_at.end()) {
+        vo_picture_at[header->seq] = picture->second;
+        tracker_us.push_back(event.timestamp_us - picture->second);
+        lateness_us.push_back(newest_ins_utime - header->utime);
+      }
       picture_at.erase(picture_at.begin(), picture_at.upper_bound(header->utime));
     }
     if (event.channel != "POSE_FUSED" || is_pose(event.data) != CheckResult::kOk) return;
@@ -76,6 +84,11 @@ int main(int argc, char** argv) {
             << ", \"imu_samples\": " << imu.size()
             << ", \"camera_to_fused_p50_ms\": " << percentile(latencies.camera_us, 0.5) * 1e-3
             << ", \"camera_to_fused_p99_ms\": " << percentile(latencies.camera_us, 0.99) * 1e-3
+            << ", \"tracker_p50_ms\": " << percentile(latencies.tracker_us, 0.5) * 1e-3
+            << ", \"tracker_p99_ms\": " << percentile(latencies.tracker_us, 0.99) * 1e-3
+            << ", \"vo_lateness_p50_ms\": " << percentile(latencies.lateness_us, 0.5) * 1e-3
+            << ", \"vo_lateness_p99_ms\": " << percentile(latencies.lateness_us, 0.99) * 1e-3
+            << ", \"vo_lateness_max_ms\": " << percentile(latencies.lateness_us, 1.0) * 1e-3
             << ", \"pictures\": " << latencies.camera_us.size() << "}\n";
   return latencies.imu_us.empty() ? 1 : 0;
 }

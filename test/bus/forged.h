@@ -9,6 +9,7 @@
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/health_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
+#include <roadfix/horizon_t.hpp>
 #include <roadfix/image_t.hpp>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/ins_status_t.hpp>
@@ -98,6 +99,7 @@ inline std::vector<Forged> forged_messages(std::mt19937& random) {
     forge<ledger_t>("LEDGER_" + name, random, all);
     forge<state_t>("STATE_" + name, random, all);
     forge<state_t>("START_" + name, random, all);
+    forge<horizon_t>("HORIZON_" + name, random, all);
     forge<config_t>("CONFIG_" + name, random, all);
   }
   return all;

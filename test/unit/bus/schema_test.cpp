@@ -9,6 +9,7 @@
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/health_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
+#include <roadfix/horizon_t.hpp>
 #include <roadfix/image_t.hpp>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/ins_status_t.hpp>
@@ -36,9 +37,9 @@ std::map<std::string, int64_t> generated_fingerprints() {
 }
 
 std::map<std::string, int64_t> all_generated() {
-  return generated_fingerprints<aiding_t, config_t, fusion_state_t, gnss_t, health_t, heartbeat_t, image_t, imu_t,
-                                ins_status_t, ledger_entry_t, ledger_t, mag_t, pose_t, provenance_t, raw_t, state_t,
-                                vo_features_t, vo_restart_t, vo_status_t, wheels_t>();
+  return generated_fingerprints<aiding_t, config_t, fusion_state_t, gnss_t, health_t, heartbeat_t, horizon_t, image_t,
+                                imu_t, ins_status_t, ledger_entry_t, ledger_t, mag_t, pose_t, provenance_t, raw_t,
+                                state_t, vo_features_t, vo_restart_t, vo_status_t, wheels_t>();
 }
 
 ledger_t some_ledger() {
