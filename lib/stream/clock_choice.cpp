@@ -4,16 +4,27 @@
 
 namespace roadfix {
 
-ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<bool> may_tick) {
+/// Behind the last one where it is no clock.
+int ClockChoice::position_of(int input) const {
   int position = 0;
   while (position < static_cast<int>(clocks_.size()) && clocks_[static_cast<std::size_t>(position)].input != input) {
     ++position;
   }
+  return position;
+}
+
+ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<bool> may_tick) {
+  const int position = position_of(input);
   if (position == static_cast<int>(clocks_.size())) return Verdict::kInput;
   if (!may_tick && leaps(position, utime)) return Verdict::kRefused;
   if (!first_utime_) first_utime_ = utime;
   std::optional<int64_t>& newest = newest_utime_[static_cast<std::size_t>(position)];
-  newest = newest ? std::max(*newest, utime) : utime;
+  if (!newest || utime > *newest) {
+    newest = utime;
+    for (std::size_t i = static_cast<std::size_t>(position) + 1; i < clocks_.size(); ++i) since_utime_[i].reset();
+  }
+  std::optional<int64_t>& since = since_utime_[static_cast<std::size_t>(position)];
+  if (!since) since = utime;
 
   const bool ahead = !utime_ || utime > *utime_;
   const bool preferred = active_ < 0 ? position == 0 : position <= active_;
@@ -32,8 +43,7 @@ ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<
 bool ClockChoice::leaps(int position, int64_t utime) {
   std::optional<int64_t>& last = leap_utime_[static_cast<std::size_t>(position)];
   const bool far_ahead = utime_ && utime - *utime_ > kLeap_us;
-  const bool confirmed = last && utime > *last && utime - *last <= kLeap_us;
-  if (far_ahead && !confirmed) {
+  if (far_ahead && !confirms_leap(clocks_[static_cast<std::size_t>(position)].input, utime)) {
     last = utime;
     return true;
   }
@@ -41,9 +51,21 @@ bool ClockChoice::leaps(int position, int64_t utime) {
   return false;
 }
 
+bool ClockChoice::confirms_leap(int input, int64_t utime) const {
+  const auto position = static_cast<std::size_t>(position_of(input));
+  if (position == clocks_.size() || !utime_ || utime - *utime_ <= kLeap_us) return false;
+  const std::optional<int64_t>& last = leap_utime_[position];
+  return last && utime > *last && utime - *last <= kLeap_us;
+}
+
+/// An honest fallback is behind the preferred clock or just ahead of it, and comes more often than two thirds of the
+/// time-out: where it is past that, it has moved by a third of it. So the second condition changes nothing for it, in
+/// whichever order the two arrive.
 bool ClockChoice::may_take_over(int position, int64_t utime) const {
+  const std::optional<int64_t>& since = since_utime_[static_cast<std::size_t>(position)];
   for (std::size_t i = 0; i < static_cast<std::size_t>(position); ++i) {
     if (utime - newest_utime_[i].value_or(*first_utime_) <= clocks_[i].timeout_us) return false;
+    if (!since || utime - *since <= clocks_[i].timeout_us / 3) return false;
   }
   return true;
 }
@@ -62,6 +84,8 @@ void ClockChoice::restore(const State& state) {
   newest_utime_.resize(clocks_.size());
   leap_utime_ = state.leap_utime;
   leap_utime_.resize(clocks_.size());
+  since_utime_ = state.since_utime;
+  since_utime_.resize(clocks_.size());
   changed_ = false;
 }
 

@@ -57,6 +57,7 @@ void InputStream::save(StateWriter& writer) const {
   writer.put(static_cast<int64_t>(clock.newest_utime.size()));
   for (const std::optional<int64_t>& utime : clock.newest_utime) writer.put(utime);
   for (const std::optional<int64_t>& utime : clock.leap_utime) writer.put(utime);
+  for (const std::optional<int64_t>& utime : clock.since_utime) writer.put(utime);
   writer.put(run_);
   writer.put(horizon_);
   writer.put(lateness_us_);
@@ -83,8 +84,10 @@ void InputStream::load(StateReader& reader) {
   const auto clocks = static_cast<std::size_t>(get_count(reader, static_cast<int64_t>(inputs_.size())));
   clock.newest_utime.resize(clocks);
   clock.leap_utime.resize(clocks);
+  clock.since_utime.resize(clocks);
   for (std::optional<int64_t>& utime : clock.newest_utime) reader.get(utime);
   for (std::optional<int64_t>& utime : clock.leap_utime) reader.get(utime);
+  for (std::optional<int64_t>& utime : clock.since_utime) reader.get(utime);
   clock_.restore(clock);
   reader.get(run_);
   reader.get(horizon_);

@@ -44,6 +44,7 @@ TEST_CASE("a silent clock is followed by the next after its time-out, and comes 
 TEST_CASE("a clock that rested for one that did not come back goes on after the time-out, as a change") {
   ClockChoice clock = three_clocks();
   clock.offer(kIns, 1000);
+  clock.offer(kVo, 1060);
   clock.offer(kVo, 1101);
   clock.offer(kIns, 1095);
   REQUIRE(clock.offer(kVo, 1150) == Verdict::kInput);
@@ -51,6 +52,30 @@ TEST_CASE("a clock that rested for one that did not come back goes on after the 
   REQUIRE(clock.changed());
   REQUIRE(clock.offer(kVo, 1200) == Verdict::kTick);
   REQUIRE_FALSE(clock.changed());
+}
+
+TEST_CASE("a fallback whose stamps run ahead makes no living clock silent") {
+  ClockChoice clock = three_clocks();
+  for (int64_t t = 1000; t < 3000; t += 10) {
+    REQUIRE(clock.offer(kIns, t) == Verdict::kTick);
+    if (t % 20 == 0) REQUIRE(clock.offer(kVo, t + (t < 1500 ? -30 : 400)) == Verdict::kInput);
+  }
+  for (int64_t t = 3400; t <= 3430; t += 10) REQUIRE(clock.offer(kVo, t) == Verdict::kInput);
+  REQUIRE(clock.offer(kVo, 3440) == Verdict::kTick);  // once the other is silent: a third of its time-out from 3400 on
+}
+
+TEST_CASE("an honest fallback takes over at one and the same sample, however late it arrives") {
+  for (int64_t late = 0; late <= 50; late += 10) {
+    CAPTURE(late);
+    ClockChoice clock = three_clocks();
+    std::optional<int64_t> took_over;
+    for (int64_t now = 1000; now < 1300; now += 10) {
+      if (now <= 1100) REQUIRE(clock.offer(kIns, now) == Verdict::kTick);
+      const bool ticks = clock.offer(kVo, now - late) == Verdict::kTick;
+      if (ticks && !took_over) took_over = now - late;
+    }
+    REQUIRE(took_over == 1210);
+  }
 }
 
 TEST_CASE("the third clock waits for both before it") {
@@ -90,6 +115,7 @@ TEST_CASE("a stamp far in the future is refused, and costs nothing but itself") 
   REQUIRE(clock.offer(kIns, 1000 + leap + 1) == Verdict::kRefused);
   REQUIRE(clock.offer(kIns, 1010) == Verdict::kTick);
   REQUIRE(clock.offer(kVo, 1000 + 50 * leap) == Verdict::kRefused);
+  REQUIRE(clock.offer(kVo, 1060) == Verdict::kInput);
   REQUIRE(clock.offer(kVo, 1120) == Verdict::kTick);  // the wild stamps of neither keep it from taking over
   REQUIRE(clock.offer(kIns, 1120 + leap) == Verdict::kTick);
 }
@@ -115,7 +141,7 @@ TEST_CASE("a gap longer than a leap is bridged by the second sample behind it") 
 TEST_CASE("a restored choice goes on as the saved one") {
   ClockChoice clock = three_clocks();
   clock.offer(kIns, 1000);
-  clock.offer(kVo, 1080);
+  clock.offer(kVo, 1060);
   ClockChoice restored = three_clocks();
   restored.restore(clock.state());
   for (ClockChoice* c : {&clock, &restored}) {
