@@ -1,6 +1,7 @@
 #include "bus/live_stage.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <roadfix/config_t.hpp>
 #include <roadfix/horizon_t.hpp>
 
@@ -19,7 +20,7 @@ constexpr int64_t kUnsent_us = 3'000'000;
 constexpr int64_t kNoClock_us = 1'000'000;
 /// So many clock samples in a row, all that much older than the clock: the stamps have gone back (a log played again, a
 /// corrected clock), and no newer one will come for a long time.
-constexpr int64_t kBehind = 20;
+constexpr int64_t kBehind = 5;
 constexpr int64_t kBehind_us = 10'000'000;
 }  // namespace
 
@@ -49,6 +50,7 @@ void LiveStage::take(int input, std::span<const uint8_t> bytes) {
     }
   }
   if (header && is_plausible(*header) && is_clock(input)) {
+    if (steps_ahead(input, header->utime) && runner_->can_decode(input, bytes)) begin_again(header->utime);
     if (memory_) recall(header->utime);
     begin_horizon(header->utime);
   }
@@ -65,7 +67,16 @@ void LiveStage::take(int input, std::span<const uint8_t> bytes) {
   if (offer == Offer::kWaits || !header || !now || !is_clock(input) || header->utime > *now - kBehind_us) return;
   if (++behind_ < kBehind) return;
   begin_again(header->utime);
+  begin_horizon(header->utime);
   runner_->offer(input, bytes);
+}
+
+/// Whether the stamps have gone ahead, and not the time: after a silence as long as their leap the stage goes on.
+bool LiveStage::steps_ahead(int input, int64_t utime) {
+  const InputStream& stream = runner_->stream();
+  if (!stream.confirms_leap(input, utime)) return false;
+  const int64_t silent_us = clock_.now_utime() - last_tick_us_;
+  return utime - *stream.clock_utime() - silent_us > ClockChoice::kLeap_us / 2;
 }
 
 void LiveStage::remember_in(const std::filesystem::path& file) {
@@ -135,7 +146,7 @@ bool LiveStage::is_clock(int input) const {
 /// A new run, as if the process had been started anew. A log may be played for the third time: no two runs have one
 /// name.
 void LiveStage::begin_again(int64_t utime) {
-  const int64_t back_us = *runner_->stream().clock_utime() - utime;
+  const int64_t ahead_us = utime - *runner_->stream().clock_utime();
   runs_.insert(*runner_->stream().run());
   runner_ = std::make_unique<StageRunner>(make_(), *this);
   runner_->measure_time();
@@ -145,9 +156,9 @@ void LiveStage::begin_again(int64_t utime) {
   overload_ = OverloadChoice(runner_->spec().overload);
   lateness_ = LatenessWatch(runner_->spec().inputs);
   horizon_run_.reset();
-  begin_horizon(utime);
   behind_ = 0;
-  began_because_ = "the stamps went back by " + std::to_string(back_us / 1'000'000) + " s: a new run";
+  began_because_ = std::string("the stamps went ") + (ahead_us > 0 ? "ahead" : "back") + " by " +
+                   std::to_string(std::abs(ahead_us) / 1'000'000) + " s: a new run";
 }
 
 bool LiveStage::step(std::chrono::milliseconds patience) {

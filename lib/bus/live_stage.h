@@ -44,6 +44,7 @@ class LiveStage : public MessageSink {
   void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) override;
   void take(int input, std::span<const uint8_t> bytes);
   [[nodiscard]] bool is_clock(int input) const;
+  [[nodiscard]] bool steps_ahead(int input, int64_t utime);
   void begin_again(int64_t utime);
   void recall(int64_t first_utime);
   void begin_horizon(int64_t first_utime);

@@ -117,6 +117,28 @@ void find_in_sequence(const StageRun& run, int input, int64_t input_run, const S
   }
 }
 
+/// Where the stamps went back under a driver that went on, its later numbers lie among the stamps of a run of the stage
+/// that had ended. Lost ones behind the last that this run took are none of its own.
+void leave_out_later(const StageSpec& spec, const StageLog& log, const StageRun& run, const provenance_t& provenance,
+                     std::vector<LogLoss>& losses) {
+  std::map<int, int64_t> last_taken;
+  for (std::size_t i = 0; i < spec.inputs.size() && i < provenance.last_seq.size(); ++i) {
+    last_taken[static_cast<int>(i)] = provenance.last_seq[i];
+  }
+  for (const ClockSpec& clock : spec.clocks) last_taken.erase(clock.input);  // a sample acts before it is applied
+  for (const LoggedInput& logged : log.inputs) {
+    const bool is_last_tick = logged.id.utime == run.outputs.back().header.utime &&
+                              logged.id.run == run.ledger.newest_run(logged.input) &&
+                              delivery_order(spec, logged.input) > 0;
+    if (is_last_tick) last_taken[logged.input] = std::max(last_taken[logged.input], logged.id.seq);
+  }
+  std::erase_if(losses, [&](const LogLoss& loss) {
+    const auto last = last_taken.find(loss.input);
+    return last != last_taken.end() && last->second >= 0 && loss.run == run.ledger.newest_run(loss.input) &&
+           loss.first_seq > last->second;
+  });
+}
+
 }  // namespace
 
 StageLog collect_stage_log(const StageSpec& spec, const std::vector<LogReader*>& readers, const LogIndex& index) {
@@ -153,6 +175,7 @@ std::vector<LogLoss> find_losses(const StageSpec& spec, const StageLog& log, con
   const RecordedOutput& last = run.outputs.back();
   const std::string& type = spec.outputs[static_cast<std::size_t>(last.output)].type;
   const std::optional<provenance_t> provenance = read_provenance(type, last.bytes);
+  if (provenance) leave_out_later(spec, log, run, *provenance, losses);
   for (std::size_t i = 0; provenance && i < sequences.size() && i < provenance->last_seq.size(); ++i) {
     if (provenance->last_seq[i] < 0) continue;
     const int input = static_cast<int>(i);

@@ -71,6 +71,10 @@ std::optional<EventId> StageRunner::check(int input, std::span<const uint8_t> by
   return std::nullopt;
 }
 
+bool StageRunner::can_decode(int input, std::span<const uint8_t> bytes) const {
+  return checks_[static_cast<std::size_t>(input)](bytes) == CheckResult::kOk;
+}
+
 Offer StageRunner::offer(int input, std::span<const uint8_t> bytes) {
   const std::optional<EventId> id = check(input, bytes);
   if (!id) return Offer::kRefused;

@@ -28,6 +28,9 @@ class StageRunner : private Outputs {
   /// Throws std::logic_error where the spec contradicts itself or names an unknown type.
   StageRunner(std::unique_ptr<Stage> stage, MessageSink& sink);
 
+  /// Whether the message passes the check of its input's type.
+  [[nodiscard]] bool can_decode(int input, std::span<const uint8_t> bytes) const;
+
   /// Takes one message as it came; whatever it is, this does not throw for it.
   Offer offer(int input, std::span<const uint8_t> bytes);
 

@@ -76,6 +76,7 @@ class InputStream {
   /// Names this start of the stage.
   [[nodiscard]] std::optional<int64_t> run() const { return run_; }
   [[nodiscard]] std::optional<int64_t> clock_utime() const { return clock_.utime(); }
+  [[nodiscard]] bool confirms_leap(int input, int64_t utime) const { return clock_.confirms_leap(input, utime); }
   [[nodiscard]] std::optional<int> clock_input() const { return clock_.active_input(); }
   [[nodiscard]] std::optional<int64_t> horizon_utime() const { return horizon_; }
   /// Over every input applied, in order.

@@ -126,7 +126,7 @@ TEST_CASE("a stage that dies soon after a driver was started anew: the older run
   require_all_identical(recorder.verdict(), 1999);  // not stopped: the ledger ends where it was killed
 }
 
-TEST_CASE("a clock put back within a driver's run: each run of the stage has its own part of it") {
+TEST_CASE("a clock put ahead and back within a driver's run: each run of the stage has its own part of it") {
   Recorder recorder(maker(filter_spec()));
   const std::vector<DriveMessage> drive = small_drive(30.0);
   const std::vector<DriveMessage> ahead = shifted(drive, 60'000'000, 0);
@@ -134,10 +134,50 @@ TEST_CASE("a clock put back within a driver's run: each run of the stage has its
     const double t_s = static_cast<double>(drive[i].header.utime - kDriveStart_us) * 1e-6;
     recorder.play(t_s > 10.0 && t_s < 20.0 ? ahead[i] : drive[i]);
     recorder.step();
+    if (i == drive.size() / 2) {
+      recorder.stop();
+      REQUIRE_THAT(recorder.last_heartbeat().state_reason, Catch::Contains("the stamps went ahead by 60 s: a new run"));
+    }
   }
   const StageVerdict verdict = recorder.verdict();
-  REQUIRE(verdict.runs.size() == 2);
+  REQUIRE(verdict.runs.size() == 3);
   require_all_identical(verdict, 2900);
+
+  // What the logger loses after that is no loss of the run that was ahead of it.
+  const TemporaryFolder folder;
+  std::vector<LoggedEvent> without = recorder.log();
+  std::erase_if(without, [](const LoggedEvent& event) {
+    return (event.channel == "IMU" && event.header.seq >= 2500 && event.header.seq < 2520) ||
+           (event.channel == "GNSS" && event.header.seq == 104);
+  });
+  write_events(folder / "without.lcm", without);
+  const StageVerdict lossy = verify({folder / "without.lcm"}, {maker(filter_spec())}).stages.at(0);
+  REQUIRE(lossy.differing() == 0);
+  REQUIRE(lossy.unverifiable() > 100);
+  REQUIRE(lossy.runs.size() == 3);
+  for (const RunVerdict& run : lossy.runs) {
+    const bool ahead_of_it = run.run > kDriveStart_us + 60'000'000;
+    if (ahead_of_it) REQUIRE((run.identical > 900 && run.unverifiable == 0 && run.losses.empty()));
+  }
+}
+
+TEST_CASE("one stamp far ahead, or a broken message behind it, begins no new run") {
+  Recorder recorder(maker(filter_spec()));
+  std::vector<DriveMessage> drive = small_drive(10.0);
+  const std::vector<DriveMessage> ahead = shifted(drive, 60'000'000, 0);
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    if (i == 900 || i == 1100) recorder.play(ahead[i + 200]);
+    if (i == 1100) {
+      DriveMessage broken = ahead[i + 220];
+      broken.bytes.pop_back();
+      recorder.play(broken);
+    }
+    recorder.play(drive[i]);
+    recorder.step();
+  }
+  const StageVerdict verdict = recorder.verdict();
+  REQUIRE(verdict.runs.size() == 1);
+  require_all_identical(verdict, 950);
 }
 
 TEST_CASE("two publishers on a channel, also on the clock: said, and what was computed verifies") {
