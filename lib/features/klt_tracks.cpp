@@ -10,47 +10,70 @@ namespace roadfix {
 namespace {
 
 constexpr float kMaxGrowth = 1.5F;         ///< of a patch's area, or the inverse, before it is taken anew
+constexpr float kNear_px = 3.0F;           ///< from a good hint; farther off the search goes from coarse to fine
 constexpr float kFreshCorrelation = 0.9F;  ///< below, likewise
+
+/// Tracks. A scout in every few tells by how much all hints are off together: a car pitches, and its last motion does
+/// not know it.
+constexpr size_t kScoutEvery = 8;
+
+float median(std::vector<float>& values) {
+  if (values.empty()) return 0.0F;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 bool outworn(const Placement& place) {
   const float growth = std::abs(place.shape.determinant());
   return growth > kMaxGrowth || growth < 1.0F / kMaxGrowth || place.correlation < kFreshCorrelation;
 }
 
+bool inside(const cv::Mat& gray, const Eigen::Vector2f& pixel) {
+  return pixel.x() >= 0.0F && pixel.y() >= 0.0F && pixel.x() < static_cast<float>(gray.cols) &&
+         pixel.y() < static_cast<float>(gray.rows);
+}
+
 }  // namespace
+
+bool KltTracks::renew(Track& track, const cv::Mat& gray, int window_px) {
+  auto fresh = cut_patch(gray, track.feature.pixel, window_px);
+  if (!fresh) return false;
+  track.patch = std::move(*fresh);
+  track.place = {track.feature.pixel - track.patch.offset};
+  return true;
+}
 
 PatchConfig KltTracks::patch_config() const {
   return {config_.klt_window_px, config_.klt_min_correlation, config_.klt_shape_std};
 }
 
-std::optional<KltTracks::Track> KltTracks::found(const Track& track, const Eigen::Vector2f& expected,
-                                                 const FlowPyramid& pyramid) const {
-  const PatchConfig config = patch_config();
-  const Eigen::Vector2f near = approach(pyramid_, pyramid, track.feature.pixel, expected, config.window_px);
-  const auto look = [&](const Patch& patch, const Eigen::Matrix2f& shape) {
+bool KltTracks::find(Track& track, const Eigen::Vector2f& expected, const FlowPyramid& pyramid) const {
+  const cv::Mat& gray = pyramid.picture();
+  if (!inside(gray, expected)) return false;
+  PatchConfig config = patch_config();
+  const auto look = [&](const Eigen::Vector2f& near) {
     Placement start;
-    start.shape = shape;
-    start.centre = near - shape * patch.offset;
-    return place_patch(patch, pyramid.picture(), start, config);
+    start.shape = track.place.shape;
+    start.centre = near - start.shape * track.patch.offset;
+    return place_patch(track.patch, gray, start, config);
   };
-  Track now = track;
-  auto place = look(track.patch, track.place.shape);
-  if (!place) {  // it looks different by now, or the light does: as it was in the last picture
-    auto fresh = cut_patch(pyramid_.picture(), track.feature.pixel, config.window_px);
-    if (!fresh) return std::nullopt;
-    now.patch = std::move(*fresh);
-    place = look(now.patch, Eigen::Matrix2f::Identity());
-    if (!place) return std::nullopt;
-  }
-  now.place = *place;
-  now.feature.pixel = place->point(now.patch);
-  if (outworn(now.place)) {
-    if (auto fresh = cut_patch(pyramid.picture(), now.feature.pixel, config.window_px)) {
-      now.patch = std::move(*fresh);
-      now.place = {now.feature.pixel - now.patch.offset};
+  config.reach_px = kNear_px;
+  auto place = look(expected);
+  if (!place) {
+    config.reach_px = 0.0F;
+    const Eigen::Vector2f near = approach(pyramid_, pyramid, track.feature.pixel, expected, config.window_px);
+    place = look(near);
+    if (!place) {  // it looks different by now, or the light does: as it was in the last picture
+      if (!renew(track, pyramid_.picture(), config.window_px)) return false;
+      place = look(near);
+      if (!place) return false;
     }
   }
-  return now;
+  track.place = *place;
+  track.feature.pixel = place->point(track.patch);
+  if (outworn(track.place)) (void)renew(track, gray, config.window_px);
+  return true;
 }
 
 std::vector<Feature> KltTracks::features() const {
@@ -60,19 +83,40 @@ std::vector<Feature> KltTracks::features() const {
   return out;
 }
 
+std::vector<Eigen::Vector2f> KltTracks::expectations(std::span<const Feature> hints) const {
+  std::vector<Eigen::Vector2f> expected;
+  expected.reserve(live_.size());
+  auto hint = hints.begin();
+  for (const Track& track : live_) {
+    while (hint != hints.end() && hint->track < track.feature.track) ++hint;
+    const bool hinted = hint != hints.end() && hint->track == track.feature.track && hint->pixel.allFinite();
+    expected.push_back(hinted ? hint->pixel : track.feature.pixel);
+  }
+  return expected;
+}
+
 std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Feature> hints) {
   FlowPyramid pyramid = flow_pyramid(gray, config_.klt_levels, std::exchange(spare_, {}));
   num_expected_ = static_cast<int>(live_.size());
   const bool same_size = !pyramid_.empty() && pyramid_.picture().size() == gray.size();
+  const std::vector<Eigen::Vector2f> expected = expectations(hints);
+  std::vector<char> found(live_.size(), 0);
+  const auto scouts = [](size_t i) { return i % kScoutEvery == 0; };
+  std::vector<float> across, down;
+  for (size_t i = 0; same_size && i < live_.size(); ++i) {
+    if (!scouts(i) || !find(live_[i], expected[i], pyramid)) continue;
+    found[i] = 1;
+    across.push_back(live_[i].feature.pixel.x() - expected[i].x());
+    down.push_back(live_[i].feature.pixel.y() - expected[i].y());
+  }
+  const Eigen::Vector2f shift(median(across), median(down));
+  for (size_t i = 0; same_size && i < live_.size(); ++i) {
+    if (!scouts(i)) found[i] = find(live_[i], expected[i] + shift, pyramid) ? 1 : 0;
+  }
   std::vector<Track> still;
   still.reserve(live_.size());
-  auto hint = hints.begin();
-  for (const Track& track : live_) {
-    if (!same_size) break;
-    while (hint != hints.end() && hint->track < track.feature.track) ++hint;
-    const bool hinted = hint != hints.end() && hint->track == track.feature.track && hint->pixel.allFinite();
-    auto now = found(track, hinted ? hint->pixel : track.feature.pixel, pyramid);
-    if (now) still.push_back(std::move(*now));
+  for (size_t i = 0; i < live_.size(); ++i) {
+    if (found[i] != 0) still.push_back(std::move(live_[i]));
   }
   live_ = std::move(still);
   spare_ = std::exchange(pyramid_, std::move(pyramid));

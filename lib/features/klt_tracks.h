@@ -30,9 +30,12 @@ class KltTracks final : public FrontEnd {
     Placement place;  ///< of the patch in the last picture
   };
   [[nodiscard]] PatchConfig patch_config() const;
-  /// The track in the new picture, which is near `expected`; nothing where it is not found.
-  [[nodiscard]] std::optional<Track> found(const Track& track, const Eigen::Vector2f& expected,
-                                           const FlowPyramid& pyramid) const;
+  /// Moves the track to where the new picture shows it, near `expected`; false where it is not found.
+  [[nodiscard]] bool find(Track& track, const Eigen::Vector2f& expected, const FlowPyramid& pyramid) const;
+  /// Takes the track's patch anew from the picture that it was last found in; false where that is too near the edge.
+  static bool renew(Track& track, const cv::Mat& gray, int window_px);
+  /// Where each live track is expected: its hint, or where it was.
+  [[nodiscard]] std::vector<Eigen::Vector2f> expectations(std::span<const Feature> hints) const;
   [[nodiscard]] std::vector<Feature> features() const;
 
   FrontEndConfig config_;

@@ -11,9 +11,12 @@ namespace {
 constexpr int kLanes = 8;  ///< sums run in so many columns: a fixed order that fits vector registers
 constexpr int kMaxPixels = (kMaxPatchWindow * kMaxPatchWindow + kLanes - 1) / kLanes * kLanes;
 constexpr int kMaxIterations = 20;
-constexpr float kEnoughPx = 0.01F;       ///< a step that moves no pixel of the patch by more is the last
-constexpr float kGreyNoise = 3.0F;       ///< grey levels: the camera's and interpolation's
-constexpr float kMaxPlaceStd_px = 0.3F;  ///< that this noise gives the place; more: the patch is flat
+constexpr float kEnoughPx = 0.02F;                  ///< a step that moves no pixel of the patch by more is the last
+constexpr float kShortest = 0.5F, kLongest = 1.5F;  ///< factor of a step, see Stretch
+constexpr int kHopelessAfter = 3;                   ///< steps; a patch that is there is nearly found by then
+constexpr float kHopeless = 0.75F;                  ///< times the correlation asked for: less by then is another thing
+constexpr float kGreyNoise = 3.0F;                  ///< grey levels: the camera's and interpolation's
+constexpr float kMaxPlaceStd_px = 0.3F;             ///< that this noise gives the place; more: the patch is flat
 constexpr float kMinGain = 0.1F, kMaxGain = 10.0F;
 
 using Pixels = std::array<float, kMaxPixels>;
@@ -159,18 +162,38 @@ bool sample(const cv::Mat& gray, const Placement& place, int side, const Grid& g
   return true;
 }
 
+/// Steps of a fixed matrix are all too long or all too short (central differences make fine texture flatter than it is,
+/// a blurred picture's is steeper): what the last one left over says by how much (Aitken's extrapolation along it).
+template <int N>
+class Stretch {
+ public:
+  Vector<N> of(const Vector<N>& step) {
+    const float gained = (asked_ - step).dot(moved_);
+    const float factor = gained > 0.0F ? std::clamp(moved_.squaredNorm() / gained, kShortest, kLongest) : 1.0F;
+    asked_ = step;
+    moved_ = factor * step;
+    return moved_;
+  }
+
+ private:
+  Vector<N> asked_ = Vector<N>::Zero(), moved_ = Vector<N>::Zero();
+};
+
 template <int N>
 std::optional<Placement> place(const Patch& patch, const cv::Mat& gray, const Placement& start,
                                const PatchConfig& config) {
   const int side = config.window_px;
   const auto half = static_cast<float>(side / 2);
+  const float reach = config.reach_px > 0.0F ? config.reach_px : 2.0F * half;
   const float edge_std = half * static_cast<float>(config.shape_std);
   const float prior = N == 6 ? kGreyNoise * kGreyNoise / (edge_std * edge_std) : 0.0F;
   Model<N> m;
   if (!prepare(patch, side, prior, m)) return std::nullopt;
   const Grid grid(side);
   const Eigen::Matrix2f start_inverse = start.shape.inverse();
+  const auto min_correlation = static_cast<float>(config.min_correlation);
   Placement now = start;
+  Stretch<N> stretch;
   Pixels seen;
   std::fill(seen.begin() + m.count, seen.begin() + m.padded, 0.0F);
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
@@ -180,13 +203,14 @@ std::optional<Placement> place(const Patch& patch, const cv::Mat& gray, const Pl
     const float gain = std::sqrt(spread / m.energy);  // also where the patches do not match yet
     if (!(gain > kMinGain && gain < kMaxGain)) return std::nullopt;
     now.correlation = dot(m.value, seen, m.padded) / (gain * m.energy);
+    if (iteration >= kHopelessAfter && now.correlation < kHopeless * min_correlation) return std::nullopt;
     Vector<N> b;
     for (int k = 0; k < N; ++k) b[k] = dot(m.slope[static_cast<size_t>(k)], seen, m.padded) / gain;
     if constexpr (N == 6) {
       const Eigen::Matrix2f off = start_inverse * now.shape - Eigen::Matrix2f::Identity();
       b.template tail<4>() += prior * half * Vector<4>(off(0, 0), off(0, 1), off(1, 0), off(1, 1));
     }
-    const Vector<N> step = m.inverse * b;
+    const Vector<N> step = stretch.of(m.inverse * b);
     Eigen::Matrix2f change = Eigen::Matrix2f::Identity();
     if constexpr (N == 6) {
       change += (Eigen::Matrix2f() << step[2], step[3], step[4], step[5]).finished() / half;
@@ -194,10 +218,10 @@ std::optional<Placement> place(const Patch& patch, const cv::Mat& gray, const Pl
     }
     now.centre -= now.shape * step.template head<2>();
     if (!now.centre.allFinite() || !now.shape.allFinite()) return std::nullopt;
-    if ((now.centre - start.centre).cwiseAbs().maxCoeff() > 2.0F * half) return std::nullopt;
+    if ((now.centre - start.centre).cwiseAbs().maxCoeff() > reach) return std::nullopt;
     if (step.cwiseAbs().maxCoeff() < kEnoughPx) break;
   }
-  if (now.correlation < static_cast<float>(config.min_correlation)) return std::nullopt;
+  if (now.correlation < min_correlation) return std::nullopt;
   return now;
 }
 

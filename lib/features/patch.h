@@ -21,6 +21,7 @@ struct PatchConfig {
   int window_px = 11;            ///< odd, at most kMaxPatchWindow
   double min_correlation = 0.8;  ///< with the patch as it was first seen
   double shape_std = 0.1;        ///< of each number of the shape, about the start's; zero: the shape is known
+  float reach_px = 0.0F;         ///< from the start, on either axis; beyond is another thing. Zero: the window's size
 };
 
 /// Centred on a whole pixel, so that nothing is interpolated; the point it stands for lies beside the centre.

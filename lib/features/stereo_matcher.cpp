@@ -10,8 +10,9 @@
 namespace roadfix {
 namespace {
 
-constexpr int kSearchLevel = 1;  ///< of the pyramid: half the size
-constexpr int kSearchHalf = 4;   ///< patches of 9 x 9 pixels at that level
+constexpr int kSearchLevel = 1;   ///< of the pyramid: half the size
+constexpr int kSearchHalf = 4;    ///< patches of 9 x 9 pixels at that level
+constexpr float kNear_px = 3.0F;  ///< from a known depth or the coarse search; farther off it goes from coarse to fine
 constexpr int kPatch = (2 * kSearchHalf + 1) * (2 * kSearchHalf + 1);
 
 struct Patch {
@@ -117,6 +118,8 @@ std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& 
   const FlowPyramid left_pyramid = flow_pyramid(left, kSearchLevel), right_pyramid = flow_pyramid(right, kSearchLevel);
   if (left_pyramid.levels.size() <= kSearchLevel || right_pyramid.levels.size() <= kSearchLevel) return result;
   const PatchConfig patches{config_.window_px, config_.min_correlation, config_.shape_std};
+  PatchConfig near = patches;
+  near.reach_px = kNear_px;
   for (size_t i = 0; i < queries.size(); ++i) {
     const auto normalised = left_.unproject(queries[i].pixel.cast<double>());
     const auto patch = cut_patch(left, queries[i].pixel, patches.window_px);
@@ -126,8 +129,12 @@ std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& 
                                                  right_pyramid.picture(kSearchLevel), queries[i].pixel, *normalised);
     if (!begin) continue;
     Placement start;
-    start.centre = approach(left_pyramid, right_pyramid, queries[i].pixel, *begin, patches.window_px) - patch->offset;
-    const auto place = place_patch(*patch, right, start, patches);
+    start.centre = *begin - patch->offset;
+    auto place = place_patch(*patch, right, start, near);
+    if (!place) {
+      start.centre = approach(left_pyramid, right_pyramid, queries[i].pixel, *begin, patches.window_px) - patch->offset;
+      place = place_patch(*patch, right, start, patches);
+    }
     if (!place) continue;
     const Eigen::Vector2f found = place->point(*patch);
     const auto seen = right_.unproject(found.cast<double>());

@@ -168,7 +168,7 @@ std::vector<Feature> KeyframeTracker::hints(const SE3& T_map_camera) const {
     } else if (const auto before = left_.unproject(pixel.cast<double>())) {
       expected = appears(q_now_before * map_.lens().straighten(*before).homogeneous());  // as if it were far away
     }
-    if (expected && left_.sees(*expected)) out.push_back({track, expected->cast<float>()});
+    if (expected) out.push_back({track, expected->cast<float>()});
   }
   // Landmarks that were not found in the last pictures: a descriptor front end may still know them.
   const size_t seen = out.size();
