@@ -46,54 +46,49 @@ Eigen::Vector3d separation(const BundleProblem& problem, const BundleProblem::Di
          problem.views[static_cast<size_t>(d.view_a)].T_map_camera.p;
 }
 
-/// (M.8); `error_px` receives one error per observation where asked for.
-double cost_of(const BundleProblem& problem, std::vector<double>* error_px = nullptr) {
-  const Eyes eyes(problem);
-  const double scale = problem.focal_px / problem.sigma_px;
-  const LensCorrection::Vector lens = problem.lens.value - problem.lens_prior.value;
-  double sum = 0.5 * lens.dot(problem.lens_information * lens);
-  Eigen::Vector2d seen;
-  for (const BundleProblem::Observation& o : problem.observations) {
-    const bool visible = eyes.of(o).see(problem.points[static_cast<size_t>(o.point)], seen);
-    const double error = visible ? (o.normalised - seen).norm() : std::numeric_limits<double>::infinity();
-    sum += visible ? robust_cost(scale * scale * error * error, problem.huber) : kHiddenCost;
-    if (error_px != nullptr) error_px->push_back(problem.focal_px * error);
-  }
-  for (const BundleProblem::Distance& d : problem.distances) {
-    const double r = (separation(problem, d).norm() - d.distance) / d.sigma;
-    sum += 0.5 * r * r;
-  }
-  return sum;
-}
+/// (M.8) and (M.9) at one point, which need the same reprojections.
+struct Linearised {
+  NormalEquations equations;
+  double cost = 0.0;
+};
 
-/// (M.9)
-NormalEquations linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free,
-                          Purpose purpose = Purpose::kStep) {
-  NormalEquations equations(num_free, problem.points.size(), problem.observations.size());
+/// `error_px` receives one error per observation where asked for.
+Linearised linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free,
+                     Purpose purpose = Purpose::kStep, std::vector<double>* error_px = nullptr) {
+  Linearised result{NormalEquations(num_free, problem.points.size(), problem.observations.size())};
   const Eyes eyes(problem);
   const double scale = problem.focal_px / problem.sigma_px;
+  const LensCorrection::Vector lens = problem.lens_prior.value - problem.lens.value;
+  result.cost = 0.5 * lens.dot(problem.lens_information * lens);
+  result.equations.add_lens_prior(problem.lens_information, lens);
   ReprojectionJacobian J;
   Eigen::Vector2d seen;
   for (const BundleProblem::Observation& o : problem.observations) {
     const auto point = static_cast<size_t>(o.point);
-    if (!eyes.of(o).see(problem.points[point], seen, &J)) continue;
+    const bool visible = eyes.of(o).see(problem.points[point], seen, &J);
     const Eigen::Vector2d residual = scale * (o.normalised - seen);
+    const double r2 = residual.squaredNorm();
+    result.cost += visible ? robust_cost(r2, problem.huber) : kHiddenCost;
+    if (error_px != nullptr) {
+      error_px->push_back(visible ? problem.sigma_px * std::sqrt(r2) : std::numeric_limits<double>::infinity());
+    }
+    if (!visible) continue;
     J.pose *= scale;
     J.point *= scale;
     J.correction *= scale;
-    const double r2 = residual.squaredNorm(), slope = robust_weight(r2, problem.huber);
+    const double slope = robust_weight(r2, problem.huber);
     const double curvature = purpose == Purpose::kStep ? slope : robust_curvature(r2, problem.huber);
-    equations.add(free[static_cast<size_t>(o.view)], point, J, residual, {slope, curvature});
+    result.equations.add(free[static_cast<size_t>(o.view)], point, J, residual, {slope, curvature});
   }
   for (const BundleProblem::Distance& d : problem.distances) {
     const Eigen::Vector3d between = separation(problem, d);
-    const double length = between.norm();
+    const double length = between.norm(), residual = (d.distance - length) / d.sigma;
+    result.cost += 0.5 * residual * residual;
     if (length < kMinSeparation) continue;
-    equations.add_distance(free[static_cast<size_t>(d.view_a)], free[static_cast<size_t>(d.view_b)],
-                           between / (length * d.sigma), (d.distance - length) / d.sigma);
+    result.equations.add_distance(free[static_cast<size_t>(d.view_a)], free[static_cast<size_t>(d.view_b)],
+                                  between / (length * d.sigma), residual);
   }
-  equations.add_lens_prior(problem.lens_information, problem.lens_prior.value - problem.lens.value);
-  return equations;
+  return result;
 }
 
 void apply(const NormalEquations::Step& step, const std::vector<int>& free, BundleProblem& problem) {
@@ -114,36 +109,36 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
   for (const BundleProblem::View& view : problem.views) free.push_back(view.fixed ? -1 : num_free++);
 
   BundleReport report;
-  double cost = report.cost_before = cost_of(problem);
+  Linearised here = linearise(problem, free, num_free);
+  report.cost_before = here.cost;
   double damping = kFirstDamping;
-  NormalEquations equations = linearise(problem, free, num_free);
   while (report.iterations < max_iterations) {
     ++report.iterations;
     const auto views = problem.views;
     const auto points = problem.points;
     const LensCorrection lens = problem.lens;
-    apply(equations.solve(damping), free, problem);
-    const double now = cost_of(problem);
-    if (!(now < cost)) {  // also when it is not a number
+    apply(here.equations.solve(damping), free, problem);
+    Linearised there = linearise(problem, free, num_free);
+    if (!(there.cost < here.cost)) {  // also when it is not a number
       problem.views = views;
       problem.points = points;
       problem.lens = lens;
       damping *= 10.0;
       continue;
     }
-    const bool enough = cost - now < kEnoughGain * cost;
-    cost = now;
+    const bool enough = here.cost - there.cost < kEnoughGain * here.cost;
+    here = std::move(there);
     damping = std::max(1e-9, 0.1 * damping);
-    equations = linearise(problem, free, num_free);
     if (enough) break;
   }
-  report.cost_after = cost_of(problem, &report.error_px);
-  equations = linearise(problem, free, num_free, Purpose::kCovariance);
-  const Eigen::MatrixXd cov = equations.covariance();
+  report.error_px.reserve(problem.observations.size());
+  const Linearised end = linearise(problem, free, num_free, Purpose::kCovariance, &report.error_px);
+  report.cost_after = end.cost;
+  const Eigen::MatrixXd cov = end.equations.covariance();
   if (num_free > 0) {
     const int row = 6 * (num_free - 1);
     report.cov_last = cov.block<6, 6>(row, row);
-    report.clustered_cov_last = equations.clustered_covariance(cov).block<6, 6>(row, row);
+    report.clustered_cov_last = end.equations.clustered_covariance(cov).block<6, 6>(row, row);
   }
   report.lens_cov = cov.bottomRightCorner<LensCorrection::kSize, LensCorrection::kSize>();
   return report;
