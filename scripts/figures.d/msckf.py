@@ -1,10 +1,9 @@
 """msckf: vo_tracker in mode msckf on the drives of ../shared/data, and its filter on simulated drives (tracks without
-pixels, build/release/bin/msckf_drives)."""
+pixels, build/release/bin/msckf_drives). CPU: build/release/bin/msckf_cost."""
 import bisect
 import csv
 import json
 import math
-import resource
 import statistics
 
 from support import Skipped, root_mean_square
@@ -23,7 +22,7 @@ def mode_msckf(vehicle):
 
 
 def replayed(runs, drive):
-    """(rows of the exported poses, CPU seconds of the replay) of a drive of ../shared/data."""
+    """(rows of the exported poses, log, vehicle) of a drive of ../shared/data."""
 
     def run():
         log, vehicle = runs.imported(drive)
@@ -31,14 +30,12 @@ def replayed(runs, drive):
         if drive in UNCALIBRATED:
             runs.roadfix("calibrate", "camera-imu", log, "--config", vehicle)
         out = runs.folder(drive, "msckf") / "out.lcm"
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         runs.roadfix("replay", log, "--stages", STAGE, "--config", vehicle, "--out", out)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
         poses = out.with_suffix(".csv")
         runs.roadfix("export", out, "--channel", CHANNEL, "--format", "csv", "--out", poses)
         with open(poses, newline="") as file:
             rows = list(csv.DictReader(file))
-        return rows, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        return rows, log, vehicle
 
     return runs.once(("msckf", drive), run)
 
@@ -59,18 +56,64 @@ def frames_of(runs, drive):
     return [int(s) // 1000 if len(s) > 16 else int(s) for s in stamps]
 
 
+def truth_of(runs, drive):
+    """(times us, positions, quaternions w first) of a EuRoC recording's motion capture."""
+    with open(runs.drive(drive) / "mav0" / "state_groundtruth_estimate0" / "data.csv") as file:
+        rows = [line.split(",") for line in file if line[:1].isdigit()]
+    numbers = [[float(x) for x in row[1:8]] for row in rows]
+    return [int(row[0]) // 1000 for row in rows], [n[:3] for n in numbers], [n[3:] for n in numbers]
+
+
+def at(times, values, t):
+    """Linear interpolation; t within times."""
+    i = max(1, bisect.bisect_left(times, t))
+    share = (t - times[i - 1]) / (times[i] - times[i - 1])
+    return [a + share * (b - a) for a, b in zip(values[i - 1], values[i])]
+
+
+def yaw_between(q, p):
+    """Angle about the vertical of q p^-1."""
+    w = sum(a * b for a, b in zip(q, p))
+    z = -q[0] * p[3] + q[3] * p[0] - q[1] * p[2] + q[2] * p[1]
+    return 2 * math.atan2(z, w)
+
+
+def drift_from_truth(rows, truth):
+    """How far the way from the first pose to the last one with truth is from the true one, m. The recording is picked
+    up in its last second, after its last picture: the length of that way alone says nothing."""
+    times, positions, attitudes = truth
+    rows = [row for row in rows if times[0] <= int(row["utime_us"]) <= times[-1]]
+    first, last = rows[0], rows[-1]
+    begin, end = (int(row["utime_us"]) for row in (first, last))
+    yaw = yaw_between([float(first[k]) for k in ("qw", "qx", "qy", "qz")], at(times, attitudes, begin))
+    x, y, z = (b - a for a, b in zip(at(times, positions, begin), at(times, positions, end)))
+    true_way = [math.cos(yaw) * x - math.sin(yaw) * y, math.sin(yaw) * x + math.cos(yaw) * y, z]
+    return math.dist([b - a for a, b in zip(position(first), position(last))], true_way)
+
+
+def cost_ms(runs, log, vehicle):
+    """CPU of the stage per picture, pictures opened before; median of five runs."""
+    program = runs.program("msckf_cost")
+    return statistics.median(json.loads(runs.call(program, log, vehicle))["cpu_ms"] for _ in range(5))
+
+
 def euroc(runs):
-    rows, cpu_s = replayed(runs, "euroc_v101_first95")
-    good = valid(rows)
-    if not good:
-        raise Skipped("no valid pose on euroc_v101_first95")
-    frames = frames_of(runs, "euroc_v101_first95")
-    start = min(frames[0], int(rows[0]["utime_us"]))
-    return {
-        "first": (int(good[0]["utime_us"]) - start) * 1e-6,
-        "drift": math.dist(position(good[-1]), position(good[0])),
-        "cpu": 1e3 * cpu_s / len(frames),
-    }
+    drive = "euroc_v101_first95"
+
+    def run():
+        rows, log, vehicle = replayed(runs, drive)
+        good = valid(rows)
+        if not good:
+            raise Skipped(f"no valid pose on {drive}")
+        frames = frames_of(runs, drive)
+        start = min(frames[0], int(rows[0]["utime_us"]))
+        return {
+            "first": (int(good[0]["utime_us"]) - start) * 1e-6,
+            "drift": drift_from_truth(good, truth_of(runs, drive)),
+            "cpu": cost_ms(runs, log, vehicle),
+        }
+
+    return runs.once(("euroc",), run)
 
 
 def fixes_of(runs, drive):
@@ -108,7 +151,7 @@ def aligned_rmse(pairs):
 
 def malaga(runs):
     drive = "malaga07_part1"
-    rows, _ = replayed(runs, drive)
+    rows, _, _ = replayed(runs, drive)
     good = valid(rows)
     if len(good) < 0.8 * len(rows):
         raise Skipped(f"{drive}: {len(good)} of {len(rows)} poses are valid")
