@@ -12,6 +12,9 @@ constexpr int64_t kJump_us = 2'000'000;
 constexpr int64_t kBackwards_us = 1'000'000;
 /// So many stamps in a row that fit together but not with the offset.
 constexpr int kStraysForRestart = 3;
+/// No path becomes that much slower for good: a serial port's buffer of 4 kB holds 0.35 s at 115200 baud.
+constexpr int64_t kLate_us = 500'000;
+constexpr int64_t kLateForGood_us = 10'000'000;
 /// Beyond it sums would overflow; no clock shows it.
 constexpr int64_t kLimit_us = int64_t{1} << 61;
 /// After a longer silence the two clocks' distance is learnt from what comes, not from how far they may have parted.
@@ -23,6 +26,7 @@ std::optional<int64_t> DeviceClock::begin(int64_t device_us, int64_t read_utime)
   if (known_) ++restarts_;
   known_ = true;
   strays_ = 0;
+  late_since_us_.reset();
   creep_ps_ = 0;
   offset_us_ = read_utime - device_us;
   newest_device_us_ = device_us;
@@ -43,7 +47,27 @@ std::optional<int64_t> DeviceClock::utime(int64_t device_us, int64_t read_utime)
   const int64_t creep_us = creep_ps_ / 1'000'000;
   creep_ps_ -= creep_us * 1'000'000;
   offset_us_ = std::min(offset_us_ + creep_us, seen_us);
+  if (was_set_back(seen_us, read_utime)) {
+    ++restarts_;
+    newest_device_us_ = device_us;
+    offset_us_ = least_late_us_;
+  }
   return device_us + offset_us_;
+}
+
+bool DeviceClock::was_set_back(int64_t seen_us, int64_t read_utime) {
+  if (seen_us - offset_us_ < kLate_us) {
+    late_since_us_.reset();
+    return false;
+  }
+  if (!late_since_us_) {
+    late_since_us_ = read_utime;
+    least_late_us_ = seen_us;
+  }
+  least_late_us_ = std::min(least_late_us_, seen_us);
+  if (read_utime - *late_since_us_ < kLateForGood_us) return false;
+  late_since_us_.reset();
+  return true;
 }
 
 int64_t WrappingClock::unwrap(uint32_t stamp_us) {

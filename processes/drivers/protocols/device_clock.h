@@ -5,7 +5,8 @@
 /// upwards as fast as two clocks may part, so that it follows either: late readings do not move it, early ones do at
 /// once. What remains is the least delay of the path, for which a driver has its `latency_s`. (The lower envelope as in
 /// Moon, Skelly, Towsley, Estimation and removal of clock skew from network delay measurements, 1999, without the
-/// line.)
+/// line.) A device's clock that was set back by less than stamps may be out of order, as by a leap second, looks like a
+/// path that became slower: what stays that late for ten seconds is the new offset.
 #pragma once
 
 #include <cstdint>
@@ -29,12 +30,16 @@ class DeviceClock {
 
  private:
   std::optional<int64_t> begin(int64_t device_us, int64_t read_utime);
+  /// Whether every reading has been late for so long that the device's clock must have been set back.
+  bool was_set_back(int64_t seen_us, int64_t read_utime);
 
   bool known_ = false;
   int64_t offset_us_ = 0;
   int64_t newest_device_us_ = 0;
   int64_t creep_ps_ = 0;  ///< not yet worth a microsecond
   int strays_ = 0;
+  std::optional<int64_t> late_since_us_;  ///< when the readings became late
+  int64_t least_late_us_ = 0;             ///< the smallest offset seen since
   int64_t restarts_ = 0;
 };
 

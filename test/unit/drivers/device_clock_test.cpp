@@ -62,6 +62,30 @@ TEST_CASE("one stamp that jumped is refused, a clock that was set anew is follow
   CHECK_FALSE(clock.utime(INT64_MIN, kStart_us));
 }
 
+/// 10 Hz for a minute, read 1 ms late; after 20 s the device's clock is `back_us` behind, for `for_s` seconds. The
+/// error of the stamp at `at_s` seconds, us.
+int64_t error_after_step(int64_t back_us, int for_s, int at_s) {
+  DeviceClock clock;
+  for (int i = 0; i < 600; ++i) {
+    const int64_t t_us = int64_t{100'000} * i;
+    const bool back = i >= 200 && i < 200 + 10 * for_s;
+    const auto utime = clock.utime(t_us - (back ? back_us : 0), kStart_us + t_us + 1000);
+    REQUIRE(utime);
+    REQUIRE(*utime <= kStart_us + t_us + 1000);
+    if (i == 10 * at_s) return *utime - (kStart_us + t_us + 1000);
+  }
+  return INT64_MAX;
+}
+
+TEST_CASE("a clock that was set back by a leap second is followed after ten seconds") {
+  CHECK(error_after_step(1'000'000, 40, 29) < -990'000);  // it may still be a slow path
+  CHECK(std::abs(error_after_step(1'000'000, 40, 31)) <= 1);
+  CHECK(std::abs(error_after_step(700'000, 40, 31)) <= 1);
+  CHECK(error_after_step(400'000, 40, 31) < -390'000);        // a path's delay that grew: no step
+  CHECK(std::abs(error_after_step(1'000'000, 5, 40)) < 10);   // late for 5 s only: the offset stays
+  CHECK(std::abs(error_after_step(1'000'000, 20, 55)) <= 1);  // set back, and forward again
+}
+
 TEST_CASE("a counter of 32 bits goes on over its wrap, and a new start is told from one") {
   WrappingClock clock;
   int64_t last = clock.unwrap(4'294'900'000U);
