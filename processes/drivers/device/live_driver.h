@@ -23,6 +23,8 @@ class LiveDriver {
   /// In plain words what is the matter; empty where all is well.
   [[nodiscard]] std::string trouble() const;
   [[nodiscard]] std::string device_name() const { return session_.name(); }
+  /// How often the device was opened.
+  [[nodiscard]] int64_t openings() const { return session_.openings(); }
 
  private:
   class BusOutputs : public SensorOutputs {

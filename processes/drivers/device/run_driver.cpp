@@ -48,14 +48,22 @@ void run_live(const Arguments& arguments, const DriverSetup& setup) {
   LiveDriver driver(setup, bus);
   ServiceNotifier service;
   service.ready("on " + arguments.bus);
+  const auto say = [&](const std::string& text) { std::cerr << setup.name << ": " << text << std::endl; };
   std::string said;
+  int64_t openings = 0;
   while (!stop_requested() && driver.step(kPatience)) {
     service.alive();
+    // At once: who uses a pseudo-terminal of ours must learn its name before a byte can come.
+    if (driver.openings() != openings) {
+      say("opened " + driver.device_name());
+      said.clear();
+    }
+    openings = driver.openings();
     const std::string trouble = driver.trouble();
     const std::string kind = trouble.substr(0, trouble.find(';'));
     if (kind == said) continue;
     said = kind;
-    std::cerr << setup.name << ": " << (trouble.empty() ? driver.device_name() + ": bytes come" : trouble) << std::endl;
+    say(trouble.empty() ? driver.device_name() + ": bytes come" : trouble);
   }
   service.stopping();
   driver.stop();

@@ -1,6 +1,9 @@
 // Serial ports and pseudo-terminals.
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -68,7 +71,6 @@ class PtySource : public DescriptorSource {
   int end_;
 };
 
-/// A serial port gives 0 bytes where a file would be over: nothing came, or it is gone.
 class SerialSource : public DescriptorSource {
  public:
   using DescriptorSource::DescriptorSource;
@@ -76,6 +78,18 @@ class SerialSource : public DescriptorSource {
   SerialSource(const SerialSource&) = delete;
   SerialSource& operator=(const SerialSource&) = delete;
 };
+
+/// Two readers would share the bytes between them. The lock goes with its holder, however that ends. TIOCEXCL shuts out
+/// programs that ask for no lock, but it stays with the terminal until the last one has closed it: a pseudo-terminal,
+/// whose other end stays open, would be shut to us as well when we were killed.
+void take_for_us_alone(int descriptor, const std::string& name) {
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) throw SourceError(name + ": another program reads it");
+  struct stat status {};
+  constexpr unsigned kFirstPty = 136, kLastPty = 143;  // Linux, Documentation/admin-guide/devices.txt
+  if (::fstat(descriptor, &status) != 0) throw SourceError(name + ": " + std::strerror(errno));
+  const bool pty = major(status.st_rdev) >= kFirstPty && major(status.st_rdev) <= kLastPty;
+  if (!pty) ::ioctl(descriptor, TIOCEXCL);
+}
 
 }  // namespace
 
@@ -85,7 +99,7 @@ std::unique_ptr<ByteSource> open_serial(const std::string& path, int baud) {
   if (descriptor < 0) throw SourceError(path + ": " + std::strerror(errno));
   auto source = std::make_unique<SerialSource>(descriptor, path);
   make_raw(descriptor, speed, path);
-  ::ioctl(descriptor, TIOCEXCL);  // two readers would share the bytes between them
+  take_for_us_alone(descriptor, path);
   ::tcflush(descriptor, TCIFLUSH);
   return source;
 }
