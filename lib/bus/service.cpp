@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -74,6 +75,20 @@ void make_realtime(int priority) {
     throw std::runtime_error(std::string("--realtime: memory cannot be locked: ") + std::strerror(errno) +
                              " (allow it: LimitMEMLOCK=infinity in the unit, or 'ulimit -l unlimited')");
   }
+}
+
+bool may_be_realtime(int priority) {
+  const pid_t pid = ::fork();
+  if (pid == 0) {
+    try {
+      make_realtime(priority);
+      ::_exit(0);
+    } catch (const std::runtime_error&) {
+      ::_exit(1);
+    }
+  }
+  int status = 1;
+  return pid > 0 && ::waitpid(pid, &status, 0) == pid && status == 0;
 }
 
 }  // namespace roadfix

@@ -36,4 +36,7 @@ class ServiceNotifier {
 /// Throws std::runtime_error that says what allows it. Other processes wait while this one runs: on request only.
 void make_realtime(int priority);
 
+/// Whether make_realtime() would do it; tried in a process of its own. For programs without threads.
+[[nodiscard]] bool may_be_realtime(int priority);
+
 }  // namespace roadfix

@@ -5,6 +5,7 @@
 #include <memory>
 #include <thread>
 
+#include "bus/service.h"
 #include "config/config.h"
 #include "roadfix/commands.h"
 #include "roadfix/supervise/supervisor.h"
@@ -33,6 +34,11 @@ void run(const Options& options) {
   }
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stop_asked = 1; });
   const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
+  for (SupervisedProcess& process : config.processes) {
+    if (!process.realtime_optional || may_be_realtime(process.realtime_priority)) continue;
+    process.realtime_priority = 0;
+    std::cout << process.name << " runs as everybody: no right to run in real time (roadfix doctor tells more)\n";
+  }
   Supervisor supervisor(config, std::filesystem::absolute(options.vehicle), programs,
                         [](const std::string& line) { std::cout << line << std::endl; });
   while (stop_asked == 0) {

@@ -23,6 +23,7 @@ struct SupervisedProcess {
   std::vector<std::string> arguments;  ///< after --config and --bus
   int realtime_priority = 0;           ///< of our programs: --realtime; 0: as everybody
   bool plain = false;                  ///< no --config and --bus: a program that is not ours, for example lcm-logger
+  bool realtime_optional = false;      ///< as everybody where the system allows no real time
 };
 
 /// configs/<vehicle>/run.yaml: what makes up the vehicle's stack.
@@ -43,6 +44,7 @@ void visit(SupervisedProcess& c, Visitor& v) {
   v.text("program", c.program);
   v.texts("arguments", c.arguments);
   v.integer("realtime_priority", c.realtime_priority, 0, 99);
+  v.boolean("realtime_optional", c.realtime_optional);
   v.boolean("plain", c.plain);
   v.check("realtime_priority", !c.plain || c.realtime_priority == 0,
           "is for our own programs; for others: program: chrt, arguments: [-f, \"50\", NAME]");

@@ -98,6 +98,7 @@ TEST_CASE("a watchdog of another process is not fed, and without a manager nothi
 
 TEST_CASE("a priority that does not exist is refused with what allows it") {
   CHECK_THROWS_WITH(make_realtime(1000), Catch::Contains("LimitRTPRIO"));
+  CHECK_FALSE(may_be_realtime(1000));
 }
 
 }  // namespace
