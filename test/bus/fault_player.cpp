@@ -2,8 +2,8 @@
 // SCHEDULE CHANNELS [BEGIN_US]
 //
 // A line of the schedule: NAME FROM_S TO_S CHANNELS KIND VALUE, where CHANNELS is a regular expression over names. Told
-// on stdout when it begins and ends: "begin NAME WALL_US". Acts on what was recorded, pictures too, unlike the faults
-// of `roadfix simulate`, and on the bytes.
+// on stdout when it begins and ends: "begin NAME WALL_US", and first of all "spoilt NAME MESSAGES". Acts on what was
+// recorded, pictures too, unlike the faults of `roadfix simulate`, and on the bytes.
 //   unplugged  nothing comes; the numbers go on afterwards without a gap      lost       nothing comes; a gap in the
 //   numbers tells frozen     the last values under new stamps                                delayed    comes VALUE s
 //   later shifted    stamps are VALUE s off                                          garbage    bytes that are no
@@ -117,6 +117,7 @@ class Plan {
     bool garbage = false;
     for (const Fault& fault : faults_) {
       if (!fault.holds(t_us) || !std::regex_match(channel, fault.pattern)) continue;
+      ++spoilt_[fault.name];
       if (fault.kind == "unplugged") return;
       if (fault.kind == "lost") {
         ++seq_[channel];
@@ -158,6 +159,9 @@ class Plan {
     }
   }
 
+  /// How many messages each fault met.
+  [[nodiscard]] const std::map<std::string, int>& spoilt() const { return spoilt_; }
+
   std::vector<Planned> take() {
     std::stable_sort(planned_.begin(), planned_.end(),
                      [](const Planned& a, const Planned& b) { return a.at_us < b.at_us; });
@@ -175,6 +179,7 @@ class Plan {
   const std::vector<Fault>& faults_;
   std::mt19937 random_{20};
   std::map<std::string, int64_t> seq_, last_at_us_;
+  std::map<std::string, int> spoilt_;
   std::map<std::string, std::vector<uint8_t>> last_;
   std::vector<Planned> planned_;
 };
@@ -191,6 +196,7 @@ std::vector<Planned> plan_of(const char* log, const std::vector<Fault>& faults, 
     plan.add(event->timestamp_us - *first_us, channel, event->data, *first_us);
   }
   plan.forge();
+  for (const auto& [name, count] : plan.spoilt()) std::cout << "spoilt " << name << " " << count << std::endl;
   return plan.take();
 }
 
