@@ -1,5 +1,6 @@
 #include "bus/service.h"
 
+#include <malloc.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
@@ -63,6 +64,13 @@ void ServiceNotifier::alive() {
 }
 
 void ServiceNotifier::stopping() { send("STOPPING=1"); }
+
+void give_memory_back() {
+  constexpr int kLarge_bytes = 64 << 10;
+  constexpr int kHeaps = 2;
+  ::mallopt(M_MMAP_THRESHOLD, kLarge_bytes);
+  ::mallopt(M_ARENA_MAX, kHeaps);
+}
 
 void make_realtime(int priority) {
   sched_param wanted{};

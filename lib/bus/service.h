@@ -32,6 +32,10 @@ class ServiceNotifier {
   std::chrono::steady_clock::time_point due_{};
 };
 
+/// Makes the C library give large buffers back at once. By itself it learns from the first snapshot of a megabyte to
+/// keep such buffers in the heap, where the small messages between them hold the rest for ever.
+void give_memory_back();
+
 /// SCHED_FIFO at `priority` (1 to 99) for this thread and those it will start, and memory that is never paged out.
 /// Throws std::runtime_error that says what allows it. Other processes wait while this one runs: on request only.
 void make_realtime(int priority);

@@ -142,6 +142,7 @@ int record(const Options& options) {
     return 0;
   }
   catch_stop_signals();
+  give_memory_back();
   if (options.realtime > 0) make_realtime(options.realtime);
   NetworkBus bus(options.bus);
   RunClock clock;

@@ -1,5 +1,6 @@
 /// The whole drive, thin: where each estimate was, how wrong and how sure, and the verdict. Bounded: a long drive keeps
-/// fewer points a minute. One thread adds, others may ask.
+/// fewer points a minute. An estimate's room is taken whole when it is first heard, so that hours do not make the
+/// monitor grow. One thread adds, others may ask.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +40,14 @@ class History {
 
  private:
   mutable std::mutex mutex_;
-  std::vector<Row> rows_;
+  struct Time {
+    int64_t t_us = 0;
+    int verdict = 0;
+  };
+  using Column = std::vector<Place>;  ///< always of kMost + 1 places, of which as many count as there are times
+
+  std::vector<Time> times_;
+  std::map<std::string, Column> columns_;
   int64_t spacing_us_ = 500'000;
 };
 
