@@ -17,9 +17,9 @@ constexpr int kDrainAtOnce = 1000;
 /// Messages and time handled before the caller gets its turn (heartbeats, the watchdog), however many wait.
 constexpr int kHandleAtOnce = 1000;
 constexpr auto kHandleFor = std::chrono::milliseconds(100);
-constexpr std::size_t kMaxFreeBuffers = 256;
+constexpr std::size_t kMaxFreeBuffers = 64;
 /// Of one that is kept: a buffer never shrinks, so in the end each would be as large as the largest message ever.
-constexpr std::size_t kMaxFreeBytes = 16 << 10;
+constexpr std::size_t kMaxFreeBytes = 1 << 10;
 
 std::string with_receive_buffer(const std::string& url) {
   if (!url.starts_with("udpm://") || url.find("recv_buf_size=") != std::string::npos) return url;

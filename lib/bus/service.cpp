@@ -66,7 +66,7 @@ void ServiceNotifier::alive() {
 void ServiceNotifier::stopping() { send("STOPPING=1"); }
 
 void give_memory_back() {
-  constexpr int kLarge_bytes = 64 << 10;
+  constexpr int kLarge_bytes = 16 << 10;
   constexpr int kHeaps = 2;
   ::mallopt(M_MMAP_THRESHOLD, kLarge_bytes);
   ::mallopt(M_ARENA_MAX, kHeaps);
