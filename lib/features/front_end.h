@@ -52,6 +52,7 @@ void visit(FrontEndConfig& c, Visitor& v) {
   v.number("min_distance_px", c.min_distance_px, 2.0, 100.0);
   v.integer("fast_threshold", c.fast_threshold, 1, 100);
   v.integer("klt_window_px", c.klt_window_px, 5, 31);
+  v.check("klt_window_px", c.klt_window_px % 2 == 1, "must be odd: the window has a pixel in its middle");
   v.integer("klt_levels", c.klt_levels, 0, 6);
   v.number("klt_min_correlation", c.klt_min_correlation, 0.0, 1.0);
   v.number("klt_shape_std", c.klt_shape_std, 0.0, 1.0);

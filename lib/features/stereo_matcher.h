@@ -28,6 +28,7 @@ void visit(StereoConfig& c, Visitor& v) {
   v.number("max_epipolar_px", c.max_epipolar_px, 0.1, 10.0);
   v.number("min_correlation", c.min_correlation, 0.0, 1.0);
   v.integer("window_px", c.window_px, 5, 31);
+  v.check("window_px", c.window_px % 2 == 1, "must be odd: the window has a pixel in its middle");
   v.number("shape_std", c.shape_std, 0.0, 1.0);
 }
 

@@ -113,6 +113,9 @@ struct Setter {
   void group(const char*, T& x) {
     visit(x, *this);
   }
+  void check(const char* name, bool ok, const std::string& what) const {
+    if (name == key && !ok) throw std::runtime_error(key + " = " + text + " " + what);
+  }
 };
 
 int run(int argc, char** argv) {

@@ -9,6 +9,7 @@
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
+#include "config/config.h"
 #include "geometry/determinism.h"
 #include "geometry/so3.h"
 #include "streams.h"
@@ -252,6 +253,19 @@ TEST_CASE("a snapshot taken on the way goes on with the same bytes") {
     CHECK(std::equal(tail.rbegin(), tail.rend(), full.rbegin()));
     auto stage = make_vo_tracker(calibration(stereo), threads(1));
     CHECK_THROWS(stage->load(std::vector<uint8_t>{1, 2, 3}));
+  }
+}
+
+TEST_CASE("a window without a middle is refused with its file, line and value") {
+  const auto parsed = [](const std::string& group, const std::string& key, int value) {
+    const std::string text = "keyframe:\n  " + group + ":\n    " + key + ": " + std::to_string(value) + "\n";
+    return parse_config<VoTrackerConfig>(text, "vo_tracker.yaml");
+  };
+  for (const auto& [group, key] : {std::pair("front_end", "klt_window_px"), std::pair("stereo", "window_px")}) {
+    CHECK_NOTHROW(parsed(group, key, 13));
+    CHECK_THROWS_WITH(parsed(group, key, 12), Catch::Contains("vo_tracker.yaml:3") &&
+                                                  Catch::Contains(std::string(group) + "." + key) &&
+                                                  Catch::Contains("12") && Catch::Contains("odd"));
   }
 }
 
