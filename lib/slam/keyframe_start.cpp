@@ -12,12 +12,21 @@ void KeyframeTracker::start_stereo(const CameraFrame& frame) {
   make_keyframe(frame, features);
   if (landmarks_at_keyframe_ < config_.start_points) {
     out_.reason = "too few points in both pictures";
+    out_.state = without_map(frame.t_us, false);
     finish_bundle();
     map_.clear();
     front_end_->reset();
     return;
   }
   begin_map(frame.t_us);
+}
+
+/// Waiting for the car to move is initialising; before a bare wall or in the dark a tracker is lost, also one that has
+/// never had a map: whoever can give a pose should.
+TrackState KeyframeTracker::without_map(int64_t t_us, bool able) {
+  if (able || !t_able_us_) t_able_us_ = t_us;
+  const bool lost = t_good_us_ || seconds_between(*t_able_us_, t_us) >= config_.lost_after_s;
+  return lost ? TrackState::kLost : TrackState::kInitialising;
 }
 
 void KeyframeTracker::begin_map(int64_t t_us) {
@@ -35,6 +44,7 @@ void KeyframeTracker::begin_map(int64_t t_us) {
     out_.closed_reset_delta = out_.reset_delta;
   }
   motion_.reset();
+  t_able_us_.reset();
   out_.map_began = true;
   out_.state = found_back_ ? TrackState::kRelocalised : TrackState::kGood;
   out_.reason = found_back_ ? "found back at a place seen before" : "";
@@ -64,12 +74,16 @@ void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Fe
   }
 }
 
+void KeyframeTracker::wait_for_parallax(int64_t t_us, size_t points) {
+  const bool able = static_cast<int>(points) >= config_.start_points;
+  out_.state = without_map(t_us, able);
+  out_.reason = able ? "waiting for parallax" : "too few points in the picture";
+}
+
 void KeyframeTracker::start_mono(const CameraFrame& frame) {
   const std::vector<Feature> features = front_end_->track(frame.left, {});
   out_.num_expected = front_end_->num_expected();
   out_.num_matches = static_cast<int>(features.size());
-  out_.state = t_good_us_ ? TrackState::kLost : TrackState::kInitialising;
-  out_.reason = "waiting for parallax";
   Pairs pairs;
   std::vector<double> flow;
   for (const Feature& f : features) {
@@ -82,8 +96,10 @@ void KeyframeTracker::start_mono(const CameraFrame& frame) {
   }
   if (!start_ || 2 * pairs.tracks.size() < start_->seen.size()) {
     begin_start(frame, features);
+    wait_for_parallax(frame.t_us, start_->seen.size());
     return;
   }
+  wait_for_parallax(frame.t_us, pairs.tracks.size());
   std::nth_element(flow.begin(), flow.begin() + static_cast<std::ptrdiff_t>(flow.size() / 2), flow.end());
   if (flow[flow.size() / 2] >= config_.start_flow_px) finish_start(frame, pairs);
 }

@@ -70,6 +70,7 @@ void KeyframeTracker::arrive(int64_t t_us) {
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
   motion_ = Motion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
   t_good_us_.reset();
+  t_able_us_.reset();
 }
 
 void KeyframeTracker::take_speeds() {
@@ -170,7 +171,7 @@ void KeyframeTracker::members(Tracker& self, Archive& archive) {
           odometry.cov_velocity, odometry.validity);
   archive(out.state, out.reason, out.reset_counter, out.reset_delta, out.cov_closed, out.closed_reset_counter,
           out.closed_reset_delta);
-  archive(self.T_map_camera_, self.t_us_, self.t_good_us_, self.motion_, self.start_, self.pixels_,
+  archive(self.T_map_camera_, self.t_us_, self.t_good_us_, self.t_able_us_, self.motion_, self.start_, self.pixels_,
           self.landmarks_at_keyframe_);
   archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
           self.scale_std_, self.restarted_, self.restart_);

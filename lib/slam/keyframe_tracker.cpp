@@ -361,7 +361,7 @@ void KeyframeTracker::finish_bundle() {
 void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
   out_.reason = reason;
   if (map_.empty()) {
-    out_.state = t_good_us_ ? TrackState::kLost : TrackState::kInitialising;
+    out_.state = without_map(t_us, false);
     return;
   }
   const SE3 T_predicted = predict(t_us);

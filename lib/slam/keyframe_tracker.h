@@ -141,6 +141,7 @@ class KeyframeTracker {
   void begin_bundle();
   void start_stereo(const CameraFrame& frame);
   void start_mono(const CameraFrame& frame);
+  void wait_for_parallax(int64_t t_us, size_t points);
   void begin_start(const CameraFrame& frame, const std::vector<Feature>& features);
   void finish_start(const CameraFrame& frame, const Pairs& pairs);
   void begin_map(int64_t t_us);
@@ -157,6 +158,8 @@ class KeyframeTracker {
   void take_scale();
   void name_scale(const KnownTravel& known);
   void forget_map();
+  /// Initialising or lost, where there is no map; `able`: this picture could begin one, or go on beginning one.
+  [[nodiscard]] TrackState without_map(int64_t t_us, bool able);
   void arrive(int64_t t_us);
   [[nodiscard]] int count_landmarks(const std::vector<KeyframeFeature>& features) const;
   void follow(const CameraFrame& frame);
@@ -186,6 +189,7 @@ class KeyframeTracker {
   SE3 T_map_camera_;  ///< at the last processed frame
   std::optional<int64_t> t_us_;
   std::optional<int64_t> t_good_us_;  ///< of the last frame with a pose
+  std::optional<int64_t> t_able_us_;  ///< of the last frame that could begin a map, or of the first to try
   std::optional<Motion> motion_;
   std::optional<Start> start_;
   std::map<int64_t, Eigen::Vector2f> pixels_;  ///< of the live tracks in the last picture

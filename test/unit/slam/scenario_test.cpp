@@ -194,10 +194,23 @@ TEST_CASE("a dark tunnel ends in lost within half a second, and a restart in the
   CHECK(dark.error_after < 1.5);  // 0.3 s at 14 m/s went unseen
 }
 
-TEST_CASE("bare corridor walls are no map: never begun, or lost") {
+TEST_CASE("bare corridor walls are no map: lost within half a second") {
   const Course c = run(shortened("corridor", 40.0), 1);
-  CHECK((c.tracked == 0 || c.lost_s));
-  CHECK(c.tracked < 0.5 * c.frames);
+  CHECK(c.tracked == 0);
+  REQUIRE(c.lost_s);
+  CHECK(*c.lost_s <= 0.5);
+}
+
+TEST_CASE("out of a bare corridor a restart takes the pose given") {
+  ScenarioConfig config = shortened("city_loop", 40.0);
+  config.scene.segments = {{0.0, StreetKind::kCorridor}, {20.0, StreetKind::kStreet}};
+  const Dark dark = into_the_dark(config, 26.0);
+  REQUIRE(dark.lost_s);
+  std::printf("corridor to street: lost at %.1f s, then %d of %d frames, error %.2f m\n", *dark.lost_s,
+              dark.tracked_after, dark.frames_after, dark.error_after);
+  CHECK(*dark.lost_s - dark.blind_s.value_or(0.0) <= 0.5);
+  CHECK(dark.tracked_after >= dark.frames_after - 1);
+  CHECK(dark.error_after < 1.5);
 }
 
 TEST_CASE("the state of a long drive is bounded") {
