@@ -94,14 +94,22 @@ void KeyframeTracker::start_mono(const CameraFrame& frame) {
     pairs.second.push_back(*normalised);
     flow.push_back(left_.focal() * (pairs.second.back() - pairs.first.back()).norm());
   }
-  if (!start_ || 2 * pairs.tracks.size() < start_->seen.size()) {
+  if (!start_) {
     begin_start(frame, features);
     wait_for_parallax(frame.t_us, start_->seen.size());
     return;
   }
   wait_for_parallax(frame.t_us, pairs.tracks.size());
+  if (flow.empty()) flow.push_back(0.0);
   std::nth_element(flow.begin(), flow.begin() + static_cast<std::ptrdiff_t>(flow.size() / 2), flow.end());
-  if (flow[flow.size() / 2] >= config_.start_flow_px) finish_start(frame, pairs);
+  // What is near leaves the picture first and what stays moves little: rather a short way than none. Whether it is
+  // long enough, the parallax of the points says.
+  const bool last_chance = 2 * pairs.tracks.size() < start_->seen.size();
+  if (last_chance || flow[flow.size() / 2] >= config_.start_flow_px) finish_start(frame, pairs);
+  if (last_chance && map_.empty()) {
+    begin_start(frame, features);
+    wait_for_parallax(frame.t_us, start_->seen.size());
+  }
 }
 
 void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs) {

@@ -131,6 +131,24 @@ TEST_CASE("after a loss a known place is taken where the vehicle can have come t
   CHECK((far.odometry.T_frame_vehicle.p - true_pose(24).p).norm() < 6.0);  // begun anew where it was lost
 }
 
+TEST_CASE("a lost mono tracker begins again, also where most of its tracks leave the picture") {
+  Run run(false);
+  int64_t t_us = 0;
+  const auto show = [&](const cv::Mat& left) { return run.tracker.process({t_us += 100'000, left, {}}); };
+  for (int i = 0; i < 12; ++i) (void)show(drive()[static_cast<size_t>(i)].left);
+  CHECK(run.tracker.last().state == TrackState::kGood);
+  for (int i = 0; i < 8; ++i) (void)show(cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1));
+  CHECK(run.tracker.last().state == TrackState::kLost);
+  int begun = -1;
+  for (int i = 12; i < 24 && begun < 0; ++i) {
+    const TrackedFrame out = show(drive()[static_cast<size_t>(i)].left);
+    if (out.odometry.validity == Validity::kValid) begun = i;
+  }
+  CHECK(begun > 12);  // it took until 24 and longer, as half the tracks were gone before the others had moved enough
+  CHECK(begun < 18);
+  CHECK(run.tracker.last().reset_counter == 1);
+}
+
 TEST_CASE("bad pictures are survived and called by name") {
   Run run(true);
   const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1), white = black + 255;
