@@ -2,6 +2,7 @@
 /// whether it finds its place again.
 #include <catch2/catch.hpp>
 #include <cstdio>
+#include <fstream>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
@@ -232,6 +233,50 @@ TEST_CASE("the state of a long drive is bounded") {
   }
   REQUIRE(sizes.size() == 4);
   CHECK(10 * sizes[3] < 13 * std::max(sizes[1], sizes[2]));
+}
+
+/// Bytes that the process holds in memory.
+size_t resident() {
+  std::ifstream statm("/proc/self/statm");
+  size_t total = 0, pages = 0;
+  statm >> total >> pages;
+  return pages * 4096;
+}
+
+TEST_CASE("half an hour keeps memory bounded", "[statistics]") {
+  constexpr int kLaps = 15;  // of two minutes each: every lap new tracks, and a restart where it begins
+  const test::TrackDrive d = test::make_track_drive(shortened("city_loop", 120.0), 7);
+  KeyframeTrackerConfig config = exact_lens();
+  config.close_loops = true;
+  config.max_places = 50;
+  FedTracker tracker(config, d.drive.config);
+  std::vector<size_t> states, residents;
+  int frames = 0, valid = 0;
+  for (int lap = 0; lap < kLaps; ++lap) {
+    for (const auto& event : d.events) {
+      const auto* frame = std::get_if<test::TrackFrame>(&event);
+      if (frame == nullptr) continue;
+      std::vector<TrackObservation> tracks = frame->tracks;
+      for (TrackObservation& o : tracks) o.id += 1'000'000'000LL * lap;
+      const int64_t t_us = frame->t_us + 121'000'000LL * lap;
+      const TrackedFrame& out = tracker.process(t_us, tracks);
+      ++frames;
+      valid += out.odometry.validity == Validity::kValid ? 1 : 0;
+    }
+    StateWriter writer;
+    tracker->save(writer);
+    states.push_back(writer.take().size());
+    residents.push_back(resident());
+    const Odometry begin = d.drive.truth_at(d.drive.config.start_utime);
+    tracker->restart({d.drive.config.start_utime + 121'000'000LL * (lap + 1), begin.T_frame_vehicle, begin.velocity,
+                      1e-4 * Matrix6d::Identity()});
+  }
+  std::printf("half an hour: %d of %d frames valid, state %.2f MB after 4 min, %.2f after 30; resident %+.2f MB\n",
+              valid, frames, 1e-6 * static_cast<double>(states[1]), 1e-6 * static_cast<double>(states.back()),
+              1e-6 * (static_cast<double>(residents.back()) - static_cast<double>(residents[1])));
+  CHECK(valid > 0.99 * frames);
+  CHECK(10 * states.back() < 12 * *std::max_element(states.begin(), states.begin() + 3));
+  CHECK(static_cast<double>(residents.back()) < static_cast<double>(residents[1]) + 10e6);
 }
 
 /// Points along a drive, each with a patch of its own that a made-up picture shows where the point is seen.
