@@ -168,6 +168,8 @@ def malaga_20s_m(runs):
     """The drive's one window, against the fixes, the receiver's constant latency fitted."""
     cut = ("--cut-gnss", 20, "--every", 100, "--after", 20, "--phase", 0)
     figures = runs.scored(CHANNEL, SEEING, "malaga07_part1", *cut, evaluate=("--fit-latency",))
+    if figures["outages"]["missing"]:  # one fix a second of a position alone: POSE_INS has no heading before second 34
+        raise Skipped("the outage ends without an estimate: POSE_INS is not aligned when it begins")
     return root_mean_square(outage["horizontal_m"] for outage in figures["outages"]["each"])
 
 
