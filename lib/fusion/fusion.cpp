@@ -48,6 +48,12 @@ const MotionFloor& Fusion::floor(FusionChannel c) const {
   return c == FusionChannel::kVo ? config_.vo_floor : config_.wheel_floor;
 }
 
+Eigen::Matrix3d Fusion::jitter(FusionChannel c) const {
+  if (c != FusionChannel::kVo) return Eigen::Matrix3d::Zero();
+  const Eigen::Vector3d sigma(config_.vo_jitter, config_.vo_jitter, config_.vo_yaw_jitter);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
 bool Fusion::alive_at(FusionChannel c, int64_t t_us) const {
   return memory(c).alive_us && seconds_between(*memory(c).alive_us, t_us) < timeout(c);
 }

@@ -122,10 +122,12 @@ class Fusion {
     LevelView view;                ///< of last
     int reset_counter = 0;
     bool shares_imu = false;
-    Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();  ///< m2/s2, in enu, of the INS at its last sample
-    double drift_variance = 0.0;     ///< rad2/s2, of its yaw rate at its last sample, for the INS
+    Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();  ///< m2/s2, in enu, of the INS's lasting error
+    double drift_variance = 0.0;                                    ///< rad2/s2, of its yaw rate, for the INS
+    int64_t drifts_since_us = 0;                                    ///< since when they last
     double yaw_rate_variance = 0.0;  ///< rad2/s, of its motion lately: which of two that share a gyro is better
     std::optional<int64_t> alive_us;
+    bool carried = false;  ///< its clone has come along with its last sample
     ConsistencyCheck check;
   };
 
@@ -167,7 +169,14 @@ class Fusion {
   FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, FusionChannelReport& report);
   [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
-  void follow_ins_errors(const Odometry& ins);
+  void follow_ins_errors(const Odometry& ins, double dt);
+  [[nodiscard]] Eigen::Matrix3d motion_noise(const Memory& m, const ChannelSample& sample, const LevelView& view,
+                                             const Planar& motion, double dt) const;
+  FuseStatus carry_by_ins(const Planar& motion, double dt, const Eigen::Matrix3d& R, bool with_yaw,
+                          FusionChannelReport& report);
+  FuseStatus fuse_odometry(FusionChannel channel, const Planar& motion, double dt, const Eigen::Matrix3d& R,
+                           bool with_yaw, FusionChannelReport& report);
+  [[nodiscard]] Eigen::Matrix3d jitter(FusionChannel c) const;
   void fuse_rates(const ChannelSample& sample, const LevelView& view);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
                        FusionChannelReport& report);

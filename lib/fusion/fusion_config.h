@@ -16,7 +16,8 @@ enum class FusionScheme { kRelative, kLiteral };
 /// Least uncertainty of one channel's motion.
 struct MotionFloor {
   double position = 0.01;  ///< m per sqrt(s)
-  double share = 0.0;      ///< of the way between two uses
+  double share = 0.0;      ///< of the way between two uses, along it
+  double across = 0.0;     ///< the same across it
   double yaw = 2e-4;       ///< rad per sqrt(s)
 };
 
@@ -24,6 +25,7 @@ template <class Visitor>
 void visit(MotionFloor& c, Visitor& v) {
   v.number("position_m_per_rts", c.position, 1e-6, 100.0);
   v.number("share", c.share, 0.0, 1.0);
+  v.number("share_across", c.across, 0.0, 1.0);
   v.number("yaw_rad_per_rts", c.yaw, 1e-7, 1.0);
 }
 
@@ -34,11 +36,13 @@ struct FusionConfig {
   double turn_duration = 4.0;       ///< s
   double turn_sigma = 0.01;         ///< rad/s, of a yaw rate as it is measured
   double speed_sigma = 0.05;        ///< m/s, white error of a speed, beside what the channel says of it
-  MotionFloor ins_floor;
-  MotionFloor vo_floor{0.01, 0.003, 3e-4};
-  MotionFloor wheel_floor{0.01, 0.003, 5e-4};
-  double vo_scale_std = 0.03;  ///< before GNSS has shown it
-  double vo_drift_std = 2e-4;  ///< rad/s
+  MotionFloor ins_floor{0.002, 0.0, 0.0, 2e-5};
+  MotionFloor vo_floor{0.005, 0.005, 0.002, 2e-4};  ///< stereo sees the way less sharply than its direction
+  MotionFloor wheel_floor{0.01, 0.003, 0.003, 5e-4};
+  double vo_jitter = 0.005;     ///< m, white error of one picture's place
+  double vo_yaw_jitter = 2e-4;  ///< rad, likewise
+  double vo_scale_std = 0.03;   ///< before GNSS has shown it
+  double vo_drift_std = 1e-4;   ///< rad/s
   double wheel_scale_std = 0.01;
   double least_gain = 0.01;       ///< share of variance that an absolute pose must take away to be used
   double gate = 16.3;             ///< squared Mahalanobis distance, 99.9 % of 3 degrees of freedom
@@ -65,6 +69,8 @@ void visit(FusionConfig& c, Visitor& v) {
   v.group("ins_floor", c.ins_floor);
   v.group("vo_floor", c.vo_floor);
   v.group("wheel_floor", c.wheel_floor);
+  v.number("vo_jitter_m", c.vo_jitter, 0.0, 10.0);
+  v.number("vo_yaw_jitter_rad", c.vo_yaw_jitter, 0.0, 1.0);
   v.number("vo_scale_std", c.vo_scale_std, 0.0, 1.0);
   v.number("vo_drift_std_radps", c.vo_drift_std, 0.0, 1.0);
   v.number("wheel_scale_std", c.wheel_scale_std, 0.0, 1.0);

@@ -118,8 +118,8 @@ void Fusion::save(StateWriter& writer) const {
   const auto put = [&](const auto&... members) { (write(writer, members), ...); };
   visit_members(*this, put);
   for (const Memory& m : memories_) {
-    put(m.reset_counter, m.velocity_covariance, m.drift_variance, m.yaw_rate_variance, m.shares_imu, m.alive_us,
-        m.check.ratio, m.last.has_value());
+    put(m.reset_counter, m.velocity_covariance, m.drift_variance, m.drifts_since_us, m.yaw_rate_variance, m.shares_imu,
+        m.alive_us, m.check.ratio, m.last.has_value());
     if (m.last) visit_odometry(*m.last, put);
   }
   put(restart_.has_value());
@@ -134,8 +134,8 @@ void Fusion::load(StateReader& reader) {
   visit_members(*this, get);
   for (Memory& m : memories_) {
     bool has = false;
-    get(m.reset_counter, m.velocity_covariance, m.drift_variance, m.yaw_rate_variance, m.shares_imu, m.alive_us,
-        m.check.ratio, has);
+    get(m.reset_counter, m.velocity_covariance, m.drift_variance, m.drifts_since_us, m.yaw_rate_variance, m.shares_imu,
+        m.alive_us, m.check.ratio, has);
     m.last.reset();
     if (!has) continue;
     visit_odometry(m.last.emplace(), get);

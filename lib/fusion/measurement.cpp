@@ -114,6 +114,38 @@ CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& m
   return told;
 }
 
+void carry_clone(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
+                 const Eigen::Matrix3d& R) {
+  const int c = slots.clone;
+  const Planar start = e.x.segment<3>(c);
+  const double length = length_factor(e.x, slots);
+  Planar told = motion;
+  told.head<2>() /= length;
+  if (slots.drift) told.z() -= dt * e.x(*slots.drift);
+  const Planar next = after_motion(start, told);
+  const Eigen::Vector2d way = (next - start).head<2>();
+  const Eigen::Matrix3d A = after_motion_by_start(start, told);
+  Eigen::Matrix<double, 3, kSize> rows = A.lazyProduct(e.P.middleRows<3>(c));  // cov(next, x)
+  if (slots.scale) rows.topRows<2>() -= way * e.P.row(*slots.scale);
+  if (slots.drift) rows.row(2) -= dt * e.P.row(*slots.drift);
+  Eigen::Matrix3d P = rows.middleCols<3>(c).eval().lazyProduct(A.transpose());
+  if (slots.scale) P.leftCols<2>() -= rows.col(*slots.scale) * way.transpose();
+  if (slots.drift) P.col(2) -= dt * rows.col(*slots.drift);
+  Eigen::Matrix3d to_frame = motion_by_end(start).transpose();
+  to_frame.leftCols<2>() /= length;
+  P += to_frame * R * to_frame.transpose();
+  e.x.segment<3>(c) = next;
+  e.P.middleRows<3>(c) = rows;
+  e.P.middleCols<3>(c) = rows.transpose();
+  e.P.block<3, 3>(c, c) = 0.5 * (P + P.transpose());
+}
+
+FusionMeasurement<3> same_pose(const Vector& x, const ChannelSlots& slots, const Eigen::Matrix3d& R) {
+  FusionMeasurement<3> m = absolute_pose(x, x.segment<3>(slots.clone), R);
+  m.H.middleCols<3>(slots.clone) = -Eigen::Matrix3d::Identity();
+  return m;
+}
+
 std::optional<FusionMeasurement<3>> gained_pose(const PlanarEstimate& e, const Planar& pose,
                                                 const Eigen::Matrix3d& P_pose, double least_gain) {
   const Eigen::Matrix3d no_gain = P_pose - (1.0 - least_gain) * e.P;

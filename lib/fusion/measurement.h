@@ -54,6 +54,13 @@ struct CarriedOn {
 CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
                    const Eigen::Matrix3d& R, bool with_yaw);
 
+/// The channel's own pose beside the fused one, carried on by its motion (F.11c); R as the channel measures.
+void carry_clone(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
+                 const Eigen::Matrix3d& R);
+
+/// That pose as a measurement of the fused one (F.11d).
+FusionMeasurement<3> same_pose(const fusion::Vector& x, const ChannelSlots& slots, const Eigen::Matrix3d& R);
+
 /// What `pose` with covariance `P_pose` knows beyond `e`, if all that e knows about absolute position were part of it
 /// (F.13): along the directions in which P_pose is smaller by at least `least_gain`, the measurement that takes e to
 /// the pose and its covariance. kUninformative in the others. Nothing where no direction gained.

@@ -89,6 +89,31 @@ TEST_CASE("motion carried on is the update of a pose of which no model knows any
   }
 }
 
+TEST_CASE("a pose that goes on beside the fused one tells what the relative motion tells") {
+  Draws draws(8);
+  for (int i = 0; i < 20; ++i) {
+    const FusionEstimate start = random_estimate(draws);
+    const Planar motion = predicted_motion(start.x, kVision, 0.1);  // no innovation: both are linearised alike
+    const Eigen::Matrix3d R = Eigen::Vector3d(1e-3, 2e-3, 1e-4).asDiagonal();
+    const auto beside = [&](double white) {
+      FusionEstimate e = start;
+      carry_clone(e, kVision, motion, 0.1, R);
+      const FusionMeasurement<3> m = same_pose(e.x, kVision, white * Eigen::Matrix3d::Identity());
+      CHECK(m.innovation.norm() < 1e-9);
+      (void)kalman_update<3>(e, m.H, m.innovation, m.R);
+      // The clone itself has moved: all else is compared.
+      for (int k = 0; k < 3; ++k) set_independent(e, kVoClone + k, 0.0, 0.0);
+      return e.P;
+    };
+    FusionEstimate relative = start;
+    const FusionMeasurement<3> m = relative_motion(start.x, kVision, motion, 0.1, R);
+    (void)kalman_update<3>(relative, m.H, m.innovation, m.R);
+    for (int k = 0; k < 3; ++k) set_independent(relative, kVoClone + k, 0.0, 0.0);
+    CHECK((beside(0.0) - relative.P).norm() < 0.01 * relative.P.norm());
+    CHECK((beside(1.0) - relative.P).norm() > 0.03 * relative.P.norm());
+  }
+}
+
 TEST_CASE("the gained measurement takes the estimate to the pose and its covariance") {
   Draws draws(4);
   FusionEstimate e = random_estimate(draws);

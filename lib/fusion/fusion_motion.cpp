@@ -1,0 +1,190 @@
+// Motion since a channel's last sample (MODEL.md, section 4).
+#include <algorithm>
+#include <cmath>
+
+#include "fusion/fusion_modes.h"
+
+namespace roadfix {
+
+using namespace fusion;
+
+namespace {
+
+constexpr double kScaleBase = 1.0;        ///< m, motion from which a non-metric scale is taken
+constexpr double kFirstScaleSigma = 0.2;  ///< of that scale
+constexpr double kCorrected = 0.01;       ///< share of a variance that an INS loses by a fix at least
+constexpr double kStands = 0.5;           ///< share that is left of a velocity's variance once the car stands, at most
+constexpr double kDistrustTime = 5.0;     ///< s, in which distrust of the INS velocity fades
+constexpr int kOutliers = 3;              ///< in a row: vision itself has moved away
+
+/// The INS has used a fix since its last sample: something of its pose became surer.
+bool corrected(const LevelView& last, const LevelView& now) {
+  return (now.P.diagonal().array() < (1.0 - kCorrected) * last.P.diagonal().array()).any();
+}
+
+}  // namespace
+
+/// Motion since the last use. Where the INS corrected itself in between, its velocities tell the motion without the
+/// jump.
+Planar Fusion::motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const {
+  return channel == FusionChannel::kIns ? motion_by_velocity(last, now).way : motion_between(last.pose, now.pose);
+}
+
+/// A vision without scale takes the first one from what the others say of the same motion.
+bool Fusion::scale_is_open(const ChannelSample& s, const Planar& motion) {
+  if (s.metric || !vo_scale_open_ || s.channel != FusionChannel::kVo) return false;
+  const double length = motion_between(now_.x.segment<3>(kVoClone), now_.x.segment<3>(kPos)).head<2>().norm();
+  const double measured = motion.head<2>().norm();
+  if (length < kScaleBase || !(measured > 0.0)) return true;
+  for (Mode& mode : imm_.modes) set_independent(mode.estimate, kVoScale, std::log(measured / length), kFirstScaleSigma);
+  vo_scale_open_ = false;
+  return true;
+}
+
+/// Two channels that integrate the same gyro are not two witnesses of the yaw: the better one speaks.
+bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const {
+  const FusionChannel other = s.channel == FusionChannel::kIns ? FusionChannel::kVo : FusionChannel::kIns;
+  const bool shared = s.channel == FusionChannel::kIns ? memory(other).shares_imu : s.shares_imu;
+  return shared && alive(other) && memory(other).last && agreement_.agrees &&
+         memory(other).yaw_rate_variance < variance;
+}
+
+/// The errors of the INS velocity and of its gyro last while no fix corrects them: their variances grow as the INS
+/// says; where a fix did, or the INS came to stand, what was known of them is void.
+void Fusion::follow_ins_errors(const Odometry& ins, double dt) {
+  Memory& m = memory(FusionChannel::kIns);
+  const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
+  const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
+  const double drift_variance = ins_drift_std_ * ins_drift_std_;
+  const bool redone = ins_corrected_ || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
+  const Eigen::Vector2d grown = (P - m.velocity_covariance).diagonal().cwiseMax(0.0);
+  const double drift_grown = std::max(0.0, drift_variance - m.drift_variance);
+  distrust_ *= std::exp(-dt / kDistrustTime);
+  for (Mode& mode : imm_.modes) {
+    FusionEstimate& e = mode.estimate;
+    for (int i = 0; i < 2; ++i) {
+      if (redone)
+        set_independent(e, kInsVelocity + i, 0.0, std::max(distrust_, std::sqrt(P(i, i))));
+      else
+        e.P(kInsVelocity + i, kInsVelocity + i) += grown(i);
+    }
+    if (redone)
+      set_independent(e, kInsDrift, 0.0, ins_drift_std_);
+    else
+      e.P(kInsDrift, kInsDrift) += drift_grown;
+  }
+  if (redone) {
+    m.velocity_covariance = P;
+    m.drift_variance = drift_variance;
+    m.drifts_since_us = t_us_;
+    return;
+  }
+  // The largest so far: what the wheels take off and the next steps add again is not new.
+  m.velocity_covariance.diagonal() += grown;
+  m.drift_variance += drift_grown;
+}
+
+/// Of its motion in the axes of its start: what the channel's covariance grew by, and the floor.
+Eigen::Matrix3d Fusion::motion_noise(const Memory& m, const ChannelSample& s, const LevelView& view,
+                                     const Planar& motion, double dt) const {
+  const MotionFloor& f = floor(s.channel);
+  const double way = motion.head<2>().norm();
+  const Eigen::Vector3d sigma(f.position * std::sqrt(dt) + f.share * way, f.position * std::sqrt(dt) + f.across * way,
+                              f.yaw * std::sqrt(dt));
+  if (s.channel != FusionChannel::kIns) return motion_covariance(m.view.pose, m.view.P, motion, view.P, sigma);
+  // Its positions' growth is that of the velocity's error, and some of its yaw's that of the gyro's: states here.
+  const double lasting = 2.0 * m.drift_variance * seconds_between(m.drifts_since_us, t_us_) * dt;
+  const double grown = view.P(2, 2) - m.view.P(2, 2) - lasting;
+  Eigen::Vector3d variance = sigma.cwiseAbs2();
+  variance.z() = std::max(variance.z(), grown);
+  return variance.asDiagonal();
+}
+
+FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, FusionChannelReport& report) {
+  Memory& m = memory(s.channel);
+  m.shares_imu = s.shares_imu;
+  m.carried = false;
+  if (m.last && m.reset_counter != s.reset_counter) {
+    m.last.reset();
+    if (s.channel == FusionChannel::kVo) {
+      agreement_ = AgreementState{};
+      vo_scale_open_ = true;
+      tie_.forget();
+    }
+  }
+  if (!m.last) return FuseStatus::kNotReady;
+  const double dt = seconds_between(m.last->t_us, t_us_);
+  if (dt <= 0.0) return FuseStatus::kNotReady;
+  if (dt > timeout(s.channel)) {
+    m.last.reset();
+    return FuseStatus::kNotReady;
+  }
+  const bool ins = s.channel == FusionChannel::kIns;
+  if (ins) ins_corrected_ = corrected(m.view, view);
+  const Planar motion = motion_of(s.channel, m.view, view);
+  if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
+
+  if (ins) follow_ins_errors(s.odometry, dt);
+  Eigen::Matrix3d R = motion_noise(m, s, view, motion, dt);
+  m.yaw_rate_variance = R(2, 2) / dt;
+  if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
+    R.row(2).setZero();
+    R.col(2).setZero();
+    R(2, 2) = kUninformative;
+  }
+  const bool with_yaw = R(2, 2) < kUninformative;
+  return ins ? carry_by_ins(motion, dt, R, with_yaw, report)
+             : fuse_odometry(s.channel, motion, dt, R, with_yaw, report);
+}
+
+/// The place and the yaw are the INS's, carried on (F.11b).
+FuseStatus Fusion::carry_by_ins(const Planar& motion, double dt, const Eigen::Matrix3d& R, bool with_yaw,
+                                FusionChannelReport& report) {
+  Mean<3> mean;
+  for (std::size_t i = 0; i < kModes; ++i) {
+    Mode& mode = imm_.modes[i];
+    const CarriedOn told = carry_on(mode.estimate, slots(FusionChannel::kIns), motion, dt, R, with_yaw);
+    mode.log_likelihood += told.innovation.log_likelihood;
+    add(mean, imm_.probability(static_cast<Eigen::Index>(i)), told.innovation, told.difference);
+  }
+  tell(mean.innovation, mean.difference, report);
+  return FuseStatus::kAccepted;
+}
+
+/// An odometry's pose goes on beside the fused one, by its own motion (F.11c), and is compared with it: what its
+/// pictures err by, each anew, does not add up (F.11d).
+FuseStatus Fusion::fuse_odometry(FusionChannel channel, const Planar& motion, double dt, const Eigen::Matrix3d& R,
+                                 bool with_yaw, FusionChannelReport& report) {
+  Memory& m = memory(channel);
+  const ChannelSlots where = slots(channel);
+  const Eigen::Matrix3d white = jitter(channel);
+  Eigen::Matrix3d measured = R + white;
+  if (where.scale)
+    measured.topLeftCorner<2, 2>() += std::expm1(2.0 * now_.x(*where.scale)) * white.topLeftCorner<2, 2>();
+  if (channel == FusionChannel::kVo) {
+    const FusionMeasurement<3> at = relative_motion(now_.x, where, motion, dt, measured);
+    tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
+    compare(agreement_, config_.agreement, report.nis);
+    if (!agreement_.agrees) ask_restart("vision disagrees with wheels and imu");
+    const bool outlier = report.nis > config_.gate;
+    if (!agreement_.agrees || (outlier && agreement_.count >= kOutliers)) return FuseStatus::kGated;
+    if (outlier) {
+      for (Mode& mode : imm_.modes) carry_clone(mode.estimate, where, motion, dt, R);
+      m.carried = true;
+      return FuseStatus::kGated;
+    }
+  }
+  foreign_ = true;
+  if (!with_yaw) {
+    const Mean<3> used = update<3>([&](const Vector& x) { return relative_motion(x, where, motion, dt, measured); });
+    tell(used.innovation, used.difference, report);
+    return FuseStatus::kAccepted;
+  }
+  for (Mode& mode : imm_.modes) carry_clone(mode.estimate, where, motion, dt, R);
+  m.carried = true;
+  const Mean<3> used = update<3>([&](const Vector& x) { return same_pose(x, where, white); });
+  tell(used.innovation, used.difference, report);
+  return FuseStatus::kAccepted;
+}
+
+}  // namespace roadfix

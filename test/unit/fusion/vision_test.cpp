@@ -1,0 +1,100 @@
+/// What becomes of a good vision: its pictures' own errors do not add up, and what it shows of the INS lasts.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <memory>
+
+#include "draws.h"
+#include "geometry/euler.h"
+#include "tunnel.h"
+
+namespace roadfix {
+
+using namespace fusion;
+
+namespace {
+
+using test::run;
+using test::seconds;
+using test::StreamEvent;
+using test::Tunnel;
+using test::Watch;
+
+/// Each picture's pose is off by a little, anew; the motion underneath is nearly exact.
+std::vector<StreamEvent> shaky(const Tunnel& t, double yaw_sigma) {
+  std::vector<StreamEvent> events = t.events();
+  const auto source = std::make_unique<test::Draws>(11);  // on the stack GCC 12 calls its spare uninitialised
+  test::Draws& draws = *source;
+  for (StreamEvent& e : events) {
+    if (e.sample.channel != FusionChannel::kVo) continue;
+    SE3& T = e.sample.odometry.T_frame_vehicle;
+    T.p += Eigen::Vector3d(draws.normal(0.005), draws.normal(0.005), 0.0);
+    T.q = quaternion({yaw_of(T.q) + draws.normal(yaw_sigma), 0.0, 0.0});
+  }
+  return events;
+}
+
+TEST_CASE("what each picture errs by anew is not taken for a way that was driven") {
+  Tunnel t;
+  t.vo.drift_std = 0.0;
+  t.vo.yaw_step = 2e-5;
+  const std::vector<StreamEvent> events = shaky(t, 4e-4);
+  const auto ends = [&](double known) {
+    FusionConfig c;
+    c.vo_jitter *= known;
+    c.vo_yaw_jitter *= known;
+    Fusion fusion(c);
+    Watch watch{t.drive, 95.0, 100.0};
+    int refused = 0;
+    run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+      watch(f, e);
+      const bool vision = e.sample.channel == FusionChannel::kVo;
+      if (vision && f.channel(FusionChannel::kVo).status == FuseStatus::kGated) ++refused;
+    });
+    INFO("error " << watch.largest << " m, sigma " << watch.largest_sigma << " m, " << refused << " refused");
+    return std::pair(watch.largest, refused);
+  };
+  const auto known = ends(2.0), unknown = ends(1e-3);
+  CHECK(known.first < 0.7 * unknown.first);
+  CHECK(known.second < 10);
+  CHECK(unknown.second > 100);  // teeth
+}
+
+/// What the fusion holds of the INS's velocity error at 90 s, where the INS says of its velocity's variance `said`
+/// times what it is.
+struct Held {
+  double error = 0.0;  ///< m/s
+  double sigma = 0.0;  ///< m/s
+};
+Held held(const std::function<double(double t_s)>& said) {
+  Tunnel t;
+  t.ins.velocity_walk = 0.0;  // what it errs by at the loss lasts
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    if (e.sample.channel != FusionChannel::kIns || s < 40.0) continue;
+    e.sample.odometry.velocity.x() += 0.05;
+    e.sample.odometry.cov_velocity *= said(s) * 0.0025 / e.sample.odometry.cov_velocity(0, 0);
+  }
+  Fusion fusion({});
+  Held h;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    if (seconds(t.drive, e.sample.odometry.t_us) > 89.99) return;
+    h.error = f.estimate().x.segment<2>(kInsVelocity).norm();
+    h.sigma = std::sqrt(f.estimate().P(kInsVelocity, kInsVelocity));
+  });
+  return h;
+}
+
+TEST_CASE("wheels that steady the INS's velocity ten times a second do not make its lasting error a new one") {
+  const Held even = held([](double) { return 1.0; });
+  const Held wheels = held([](double t_s) { return std::fmod(10.0 * t_s, 1.0) < 0.5 ? 0.94 : 1.0; });
+  CHECK(even.sigma < 0.02);  // vision has shown it
+  CHECK(wheels.sigma < 1.1 * even.sigma);
+  CHECK(std::abs(wheels.error - even.error) < 0.1 * even.error);
+  // A car that comes to stand knows its speed: what was held is void.
+  const Held stands = held([](double t_s) { return t_s < 89.97 ? 1.0 : 0.1; });
+  CHECK(stands.error < 0.8 * even.error);  // the speed that the fusion holds tells some of it again
+}
+
+}  // namespace
+}  // namespace roadfix
