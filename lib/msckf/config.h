@@ -32,6 +32,7 @@ struct MsckfVehicle {
   double track_width = 1.5;         ///< m, for four wheel speeds
   double mounting_std = 0.02;       ///< rad, pitch and yaw of the vehicle's axes in the imu's
   Eigen::Vector3d p_imu_vehicle = Eigen::Vector3d::Zero();  ///< m, where wheels measure, imu axes
+  double axle_std = 0.0;  ///< m, how far along the vehicle the point that does not slip may be from there
 };
 
 /// The window of past poses and the points seen from it.

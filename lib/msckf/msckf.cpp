@@ -14,7 +14,8 @@ namespace {
 constexpr int64_t kLongestStepUs = 250'000;  // without a picture the state follows at least this often
 constexpr double kMaxOffset_s = 0.3;         // of the camera's clock, that is waited for
 constexpr double kMaxGap_s = 0.5;            // of imu samples
-constexpr size_t kMaxWaiting = 64;           // pictures, wheel samples
+constexpr size_t kMaxWaiting = 1024;         // pictures, wheel samples
+constexpr double kMemory_s = 6.0;            // of imu samples before a start
 constexpr double kLineRest = 0.1;            // of the jitter that is left on the line
 constexpr double kShareMemory = 0.9;
 constexpr double kTurnSlack_s = 0.02;  // a picture may be this much newer than the samples
@@ -55,17 +56,31 @@ bool Msckf::advance(const ImuSample& imu) {
   if (!imu.gyro.allFinite() || !imu.accel.allFinite()) return false;
   if (!imu_.empty() && imu.t_us <= imu_.back().t_us) return false;
   const double dt = imu_.empty() ? 0.0 : seconds_between(imu_.back().t_us, imu.t_us);
-  if (dt > kMaxGap_s && phase_ == MsckfPhase::kRunning) lose("gap in the imu samples");
+  if (dt > kMaxGap_s) {
+    planned_.reset();
+    if (phase_ == MsckfPhase::kRunning) lose("gap in the imu samples");
+  }
   if (dt > 0.0 && dt <= kMaxGap_s) standing_.add(imu, dt);
   imu_.push_back(imu);
   follow(imu.t_us - lag_us_);
-  while (imu_.size() > 2 && imu_[1].t_us <= (phase_ == MsckfPhase::kRunning ? state_.imu.t_us : imu.t_us - micros(2.0)))
+  while (imu_.size() > 2 &&
+         imu_[1].t_us <= (phase_ == MsckfPhase::kRunning ? state_.imu.t_us : imu.t_us - micros(kMemory_s)))
     imu_.pop_front();
   return true;
 }
 
 void Msckf::follow(int64_t until_us) {
+  use_waiting(until_us);
+  if (phase_ == MsckfPhase::kRunning && until_us - state_.imu.t_us > kLongestStepUs) {
+    propagate(until_us);
+    use_vehicle(nullptr);
+    judge(until_us);
+  }
+}
+
+void Msckf::use_waiting(int64_t until_us) {
   for (;;) {
+    if (planned_ && !start_planned(until_us)) return;
     const int64_t frame_us = frames_.empty() ? INT64_MAX : picture_us(frames_.front());
     const int64_t wheels_us = wheels_.empty() ? INT64_MAX : wheels_.front().t_us;
     if (std::min(frame_us, wheels_us) > until_us) break;
@@ -73,14 +88,8 @@ void Msckf::follow(int64_t until_us) {
       use(wheels_.front());
       wheels_.pop_front();
     } else {
-      use(frames_.front());
-      frames_.pop_front();
+      if (use(frames_.front())) frames_.pop_front();
     }
-  }
-  if (phase_ == MsckfPhase::kRunning && until_us - state_.imu.t_us > kLongestStepUs) {
-    propagate(until_us);
-    use_vehicle(nullptr);
-    judge(until_us);
   }
 }
 
@@ -134,19 +143,19 @@ void Msckf::use(const WheelSample& wheels) {
   judge(wheels.t_us);
 }
 
-void Msckf::use(const SeenFrame& frame) {
+/// False where it has to wait.
+bool Msckf::use(const SeenFrame& frame) {
   const int64_t t_us = picture_us(frame);
   standing_.add(frame);
   num_seen_ = static_cast<int>(frame.points.size());
-  if (phase_ != MsckfPhase::kRunning) {
-    if (!start_standing(t_us) && !start_moving(t_us)) return;
-  }
-  if (t_us < state_.imu.t_us) return;
+  if (phase_ != MsckfPhase::kRunning && !start_standing(t_us)) return !plan_moving(t_us);
+  if (t_us < state_.imu.t_us) return true;
   propagate(t_us);
   stands_ = standing_.stands(t_us, state_.imu.v.norm());
   use_picture(frame);
   use_vehicle(nullptr);
   judge(t_us);
+  return true;
 }
 
 void Msckf::use_picture(const SeenFrame& frame) {
@@ -188,7 +197,7 @@ void Msckf::use_tracks(bool window_full) {
       const bool leaving = window_full && track.seen.front().clone == oldest;
       if (track.alive && !leaving) continue;
       --room;
-      if (track.alive && points_.make_landmark(state_, track)) continue;
+      if (track.alive && !state_.held() && points_.make_landmark(state_, track)) continue;
       points_.add(state_, track);
     }
   }
@@ -206,7 +215,8 @@ void Msckf::use_tracks(bool window_full) {
     doubtful_us_ = state_.imu.t_us;
 }
 
-bool Msckf::try_linear(const Linear& linear) {
+bool Msckf::try_linear(Linear linear) {
+  if (state_.held()) linear.expect(state_);
   const double gate = config_.aiding.gate_sigma * config_.aiding.gate_sigma + 2.0 * linear.rows();
   if (linear.nis(state_) > gate) return false;
   update_.begin(state_);

@@ -69,20 +69,46 @@ class Msckf {
     double speed = 0.0, sigma = 0.0;
   };
 
+  struct Beginning {                                                             ///< of a start in motion
+    Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), v = Eigen::Vector3d::Zero();  ///< imu axes
+    Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
+    msckf::Calibrated camera;
+  };
+  struct MovingStart {  ///< what is known of it
+    int64_t t_us = 0;
+    int64_t length_us = 0;  ///< of what will be gone through
+    Beginning at;
+    double speed_std = 0.0, side_std = 0.0, tilt_std = 0.0;
+    MsckfScale scale = MsckfScale::kUnknown;
+  };
+
   void follow(int64_t until_us);
+  void use_waiting(int64_t until_us);
   void propagate(int64_t t_us);
-  void use(const msckf::SeenFrame& frame);
+  [[nodiscard]] bool use(const msckf::SeenFrame& frame);
   void use(const WheelSample& wheels);
   void use_picture(const msckf::SeenFrame& frame);
   void use_tracks(bool window_full);
   void use_vehicle(const WheelSample* wheels);
-  bool try_linear(const msckf::Linear& linear);
+  bool try_linear(msckf::Linear linear);
   [[nodiscard]] bool due(int64_t& next_us, double interval_s) const;
   [[nodiscard]] double axle_speed(const WheelSample& wheels) const;
   [[nodiscard]] int64_t picture_us(const msckf::SeenFrame& frame) const;
 
   bool start_standing(int64_t t_us);
-  bool start_moving(int64_t t_us);
+  /// Decides on a start in motion here; it begins some seconds later, when they can be gone through.
+  bool plan_moving(int64_t t_us);
+  bool start_planned(int64_t until_us);
+  [[nodiscard]] bool speed_known() const;
+  /// Begins at `at` and uses what waits up to `end_us`; with `fixed`, linearised along the course that `at` gives.
+  void go_through(const MovingStart& plan, const Beginning& at, int64_t end_us, bool fixed);
+  void begin_moving(const MovingStart& plan, const Beginning& at);
+  /// What the plan says of the errors of a state that begins at `at`.
+  [[nodiscard]] Eigen::Matrix<double, msckf::kBaseSize, 1> expected_errors(const MovingStart& plan) const;
+  /// Where the state began, by what is known now.
+  [[nodiscard]] std::optional<Beginning> beginning(int64_t from_us) const;
+  /// Integrates the imu's samples from there to now.
+  void carry(msckf::ImuState& x, int64_t from_us) const;
   [[nodiscard]] std::optional<KnownSpeed> speed_for_start(int64_t t_us) const;
   void begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen::Vector3d& v_imu, double v_std,
                 double tilt_std);
@@ -105,6 +131,7 @@ class Msckf {
   std::deque<msckf::SeenFrame> frames_;
   std::deque<WheelSample> wheels_;
   std::optional<KnownSpeed> known_speed_, wheel_speed_;
+  std::optional<MovingStart> planned_;
 
   MsckfPhase phase_ = MsckfPhase::kStarting;
   MsckfScale scale_ = MsckfScale::kUnknown;

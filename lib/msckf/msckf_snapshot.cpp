@@ -101,6 +101,9 @@ void Msckf::serialise(Archive& a) {
   });
   for (std::optional<KnownSpeed>* speed : {&known_speed_, &wheel_speed_})
     optional(a, *speed, [&](KnownSpeed& s) { a(s.t_us, s.speed, s.sigma); });
+  optional(a, planned_, [&](MovingStart& s) {
+    a(s.t_us, s.length_us, s.at.up, s.at.v, s.speed_std, s.side_std, s.tilt_std, s.scale);
+  });
   int64_t stamp_us = stamps_.last_us();
   a(phase_, scale_, reason_, stands_, reset_counter_, last_pose_.q.coeffs(), last_pose_.p, stamp_us, next_clone_,
     clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_, used_us_, doubtful_us_, used_share_,

@@ -1,4 +1,4 @@
-// Starts, loss and restart, (M.30)-(M.33).
+// Start from rest, loss and restart, (M.30), (M.31).
 #include <cmath>
 
 #include "geometry/euler.h"
@@ -15,12 +15,6 @@ constexpr double kStandingSpeedStd = 0.02;  // m/s
 constexpr double kEarthRate = 7.3e-5;       // rad/s: what standing cannot tell from a bias
 constexpr double kLevellingStd = 2e-3;      // rad, besides the accelerometer's bias
 constexpr double kGaugeStd = 1e-4;          // m and rad: where the frame begins is a convention
-constexpr double kSpeedAge_s = 0.5;
-constexpr double kTurnRate = 0.1;   // rad/s, least that tells a speed
-constexpr double kTurnSpeed = 2.0;  // m/s
-// m/s2 along the way, standard deviation of everyday driving: what changes a speed between its sample and the start,
-// and what levelling takes for a slope.
-constexpr double kStartAccel = 1.5;
 
 using BaseMatrix = Eigen::Matrix<double, kBaseSize, kBaseSize>;
 
@@ -40,50 +34,6 @@ bool Msckf::start_standing(int64_t t_us) {
   P.block<3, 3>(kGyroBias, kGyroBias) = variance * Eigen::Matrix3d::Identity();
   scale_ = MsckfScale::kInertial;
   stands_ = true;
-  return true;
-}
-
-std::optional<Msckf::KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
-  for (const std::optional<KnownSpeed>& s : {wheel_speed_, known_speed_})
-    if (s && std::abs(seconds_between(s->t_us, t_us)) < kSpeedAge_s)
-      return KnownSpeed{s->t_us, s->speed, std::hypot(s->sigma, kStartAccel * seconds_between(s->t_us, t_us))};
-  // A turn tells it: lateral acceleration over yaw rate, as far as the road is level, (M.33).
-  const ImuBlock& block = standing_.block();
-  const double rate = block.gyro.z();
-  if (std::abs(rate) < kTurnRate || block.gyro_wander > 0.5 * std::abs(rate)) return std::nullopt;
-  const double speed = block.accel.y() / rate;
-  const double tilt = std::hypot(config_.aiding.planar_slack, config_.vehicle.mounting_std);
-  const double told = std::hypot(config_.vehicle.gravity * tilt, config_.vehicle.accel_bias_std) / std::abs(rate);
-  // The block's mean is that of its middle, up to one and a half blocks ago.
-  const double age = seconds_between(block.end_us, t_us) + 0.5 * config_.trust.block_s;
-  const double sigma = std::hypot(told, kStartAccel * age);
-  if (speed < kTurnSpeed || speed > config_.trust.max_speed || sigma > 0.5 * speed) return std::nullopt;
-  return KnownSpeed{t_us, speed, sigma};
-}
-
-bool Msckf::start_moving(int64_t t_us) {
-  const ImuBlock& block = standing_.block();
-  if (block.end_us == 0 || seconds_between(block.end_us, t_us) > 2.1 * config_.trust.block_s) return false;
-  const std::optional<KnownSpeed> known = speed_for_start(t_us);
-  if (!known) {
-    reason_ = "moving; the scale is not yet known";
-    return false;
-  }
-  // What the mean specific force has besides gravity: the turn's lateral acceleration; the rest is doubt.
-  const Eigen::Vector3d turning(0.0, known->speed * block.gyro.z(), 0.0);
-  const double doubt =
-      std::hypot(0.1, kStartAccel / config_.vehicle.gravity) + block.accel_wander / config_.vehicle.gravity;
-  const Eigen::Vector3d forward = state_.camera.R_imu_vehicle().col(0);
-  begin_at(t_us, (block.accel - turning).normalized(), known->speed * forward, known->sigma + 0.1, doubt);
-  const Eigen::Matrix3d R = state_.imu.R();
-  const double side = 0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed);  // m/s
-  const Eigen::Vector3d std(known->sigma + 0.1, side, side);
-  // The speed is known in vehicle axes, whatever the attitude is: by (M.1) R' v = R^' (v^ + nu), free of phi, (M.39).
-  Eigen::MatrixXd& P = state_.P();
-  P.middleRows<3>(kVel).leftCols<kBaseSize>().setZero();
-  P.middleCols<3>(kVel).topRows<kBaseSize>().setZero();
-  P.block<3, 3>(kVel, kVel) = R * std.cwiseAbs2().asDiagonal() * R.transpose();
-  scale_ = known->t_us == t_us ? MsckfScale::kInertial : MsckfScale::kWheels;
   return true;
 }
 
@@ -133,6 +83,7 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   state_.reset(P);
   tracks_.clear();
   propagation_.clear();
+  planned_.reset();
   phase_ = MsckfPhase::kRunning;
   reason_.clear();
   used_us_ = t_us;

@@ -64,6 +64,13 @@ int PointUpdate::linearise(const State& state, const Track& track, const Clone& 
     if (T_left_right_ && s.point.right)
       add(right_view(left, *T_left_right_), T_left_right_->R().transpose(), J, clone, *s.point.right, s.point.px);
   }
+  if (state.held()) {
+    int column = 3;
+    for (const int at : columns_->blocks()) {
+      work_.col(3 + n).head(row) -= work_.block(0, column, row, 6) * state.expected().segment<6>(at);
+      column += 6;
+    }
+  }
   return row;
 }
 

@@ -95,6 +95,7 @@ void Propagation::apply(State& state, const MsckfAiding& aiding) {
   P.topLeftCorner<9, 9>() = 0.5 * (own + own.transpose());
   P.block(0, 9, 9, n - 9) = rows.middleCols(9, n - 9);
   P.block(9, 0, n - 9, 9) = rows.middleCols(9, n - 9).transpose();
+  if (state.held()) state.expected().head<9>() = (F * state.expected().head<kImuSize>()).eval();
   const auto walk = [&](int at, int width, double std_per_rts) {
     P.diagonal().segment(at, width).array() += std_per_rts * std_per_rts * T_;
   };

@@ -49,6 +49,7 @@ void Standing::add(const ImuSample& imu, double dt) {
 }
 
 void Standing::add(const SeenFrame& frame) {
+  if (frame.t_us <= frame_us_) return;  // a start in motion comes back to it
   frame_us_ = frame.t_us;
   moved_.clear();
   auto old = older_.places.begin();

@@ -9,7 +9,7 @@ namespace roadfix::msckf {
 
 Eigen::Matrix3d Calibrated::R_imu_vehicle() const { return exp_so3({0.0, mounting.x(), mounting.y()}); }
 
-State::State() : P_(Eigen::MatrixXd::Zero(kMaxSize, kMaxSize)) {
+State::State() : P_(Eigen::MatrixXd::Zero(kMaxSize, kMaxSize)), expected_(Eigen::VectorXd::Zero(kMaxSize)) {
   clones.reserve(kMaxClones);
   landmarks.reserve(kMaxLandmarks);
 }
@@ -28,6 +28,29 @@ void State::reset(const Eigen::Matrix<double, kBaseSize, kBaseSize>& P) {
   size_ = kBaseSize;
   P_.setZero();
   P_.topLeftCorner<kBaseSize, kBaseSize>() = P;
+  expected_.setZero();
+  held_ = false;
+}
+
+void State::correct(const Eigen::VectorXd& d) {
+  if (held_) {
+    expected_.head(size_) += d.head(size_);
+  } else {
+    retract(d);
+  }
+}
+
+void State::hold(const Eigen::Matrix<double, kBaseSize, 1>& base) {
+  held_ = true;
+  expected_.setZero();
+  expected_.head<kBaseSize>() = base;
+}
+
+void State::release() {
+  if (!held_) return;
+  held_ = false;
+  retract(expected_);
+  expected_.setZero();
 }
 
 void State::retract(const Eigen::VectorXd& d) {
@@ -64,6 +87,7 @@ int State::grow(int width) {
   size_ += width;
   P_.block(at, 0, width, size_).setZero();
   P_.block(0, at, size_, width).setZero();
+  expected_.segment(at, width).setZero();
   return at;
 }
 
@@ -74,6 +98,7 @@ void State::erase(int at, int width) {
     double* column = P_.col(j).data();
     std::memmove(column + at, column + at + width, static_cast<size_t>(behind) * sizeof(double));
   }
+  for (int j = at; j < at + behind; ++j) expected_(j) = expected_(j + width);
   size_ -= width;
   const auto moved = [&](int& a) { a = a > at ? a - width : a; };
   for (Clone& c : clones) moved(c.at);
@@ -113,6 +138,11 @@ void State::add_clone(int64_t id, const Eigen::Vector3d& rate, double jitter) {
   P_.block(at, 0, 6, old) = rows.leftCols(old);
   P_.block(0, at, old, 6) = rows.leftCols(old).transpose();
   P_.block<6, 6>(at, at) = 0.5 * (own + own.transpose());
+  if (held_) {
+    expected_.segment<3>(at) = expected_.segment<3>(kAtt);
+    expected_.segment<3>(at + 3) = expected_.segment<3>(kPos);
+    expected_.segment<6>(at) += J_time * expected_(kTimeOffset);
+  }
   clones.push_back({id, at, imu.R(), imu.p});
 }
 

@@ -105,7 +105,19 @@ class State {
   /// Adds the error d (size()) to every mean, (M.1).
   void retract(const Eigen::VectorXd& d);
 
-  /// P -= Y Y', Y with size() rows, (M.20); then retract(Y s).
+  /// Adds the error d to the means, or to what is kept apart from them.
+  void correct(const Eigen::VectorXd& d);
+
+  /// From here on corrections are kept apart and the means stay a fixed course of linearisation, (M.40); `base` is what
+  /// the base block's error is expected to be. release() adds everything to the means.
+  void hold(const Eigen::Matrix<double, kBaseSize, 1>& base);
+  void release();
+  [[nodiscard]] bool held() const { return held_; }
+  /// The errors expected of the means, size() numbers that count; zero where nothing is held.
+  [[nodiscard]] const Eigen::VectorXd& expected() const { return expected_; }
+  [[nodiscard]] Eigen::VectorXd& expected() { return expected_; }
+
+  /// P -= Y Y', Y with size() rows, (M.20).
   void subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y);
 
   /// Room for a block of `width` at the end, its rows and columns zero; its first index.
@@ -124,6 +136,8 @@ class State {
   void erase(int at, int width);
 
   Eigen::MatrixXd P_;
+  Eigen::VectorXd expected_;
+  bool held_ = false;
   int size_ = kBaseSize;
 };
 

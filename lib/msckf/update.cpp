@@ -28,6 +28,14 @@ double Linear::nis(const State& state) const {
   return s.squaredNorm();
 }
 
+void Linear::expect(const State& state) {
+  int column = 0;
+  for (int k = 0; k < blocks_; ++k) {
+    r_.head(rows_) -= H_.block(0, column, rows_, width(k)) * state.expected().segment(at(k), width(k));
+    column += width(k);
+  }
+}
+
 Columns::Columns(const State& state) {
   at_[static_cast<size_t>(count_++)] = kCameraTurn;
   for (const Clone& c : state.clones) at_[static_cast<size_t>(count_++)] = c.at;
@@ -97,7 +105,7 @@ bool Update::apply(State& state) {
   llt.matrixL().solveInPlace(r);
   d_.head(size_).noalias() = PHt * r;
   state.subtract(PHt);
-  state.retract(d_);
+  state.correct(d_);
   return true;
 }
 

@@ -44,6 +44,9 @@ class Linear {
     }
   }
 
+  /// Takes out of the residual what the state expects of its own errors.
+  void expect(const State& state);
+
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] int blocks() const { return blocks_; }
   [[nodiscard]] int at(int k) const { return at_[static_cast<size_t>(k)]; }

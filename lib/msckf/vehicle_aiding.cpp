@@ -49,7 +49,9 @@ Linear no_sideslip(const State& state, const MsckfConfig& config, const Eigen::V
   const Eigen::Vector2d slip = vehicle_velocity(state, config.vehicle, gyro).tail<2>();
   linear.residual(-slip);
   const MsckfAiding& a = config.aiding;
-  linear.whiten(Eigen::Vector2d(a.sideslip_std + a.sideslip_per_accel * std::abs(acceleration), a.heave_std));
+  const double lever = config.vehicle.axle_std * state.imu.rate(gyro).z();  // m/s, what an unknown axle makes of a turn
+  const double side = std::hypot(a.sideslip_std + a.sideslip_per_accel * std::abs(acceleration), lever);
+  linear.whiten(Eigen::Vector2d(side, a.heave_std));
   return linear;
 }
 

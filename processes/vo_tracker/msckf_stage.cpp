@@ -25,6 +25,7 @@ constexpr int64_t kFeedback_us = 500'000;        // DESIGN.md, section 4
 constexpr int64_t kWheelLateness_us = 50'000;    // there, too
 constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
 constexpr int64_t kImuTimeout_us = 200'000;
+constexpr double kUnknownAxle_m = 1.0;  // standard deviation of the rear axle from the imu, where nothing is said
 
 template <class T>
 void take(const std::optional<T>& from, T& to) {
@@ -78,6 +79,7 @@ MsckfVehicle msckf_vehicle(const Calibration& calibration) {
   }
   if (calibration.mounting && calibration.mounting->std_deg)
     v.mounting_std = calibration.mounting->std_deg->tail<2>().maxCoeff() * kDegree;
+  if (calibration.body_origin != BodyOrigin::kRearAxle) v.axle_std = kUnknownAxle_m;
   return v;
 }
 

@@ -1,5 +1,5 @@
-// Starts in motion: what the covariance says of the speed and of the levelling must be what they are. A second later
-// the velocity's is still too small (printed).
+// Starts in motion: what the covariance says of the speed and of the levelling must be what they are, at the start and
+// a second later.
 #include <catch2/catch.hpp>
 
 #include "geometry/so3.h"
@@ -74,6 +74,7 @@ TEST_CASE("a start in a turn knows how little it knows") {
   REQUIRE(s.starts >= 4);
   CHECK(s.velocity / s.starts < 2.0);
   CHECK(s.levelling / s.starts < 2.0);
+  CHECK(s.later / s.starts < 2.0);
   CHECK(s.widest < 5.0);  // not by knowing nothing
 }
 
@@ -81,4 +82,5 @@ TEST_CASE("the test of starts in turns sees sigmas that are too small") {
   const Started s = start_in_turns(0.2);
   CHECK(s.levelling / s.starts > 2.0);
   CHECK(s.velocity / s.starts > 2.0);
+  CHECK(s.later / s.starts > 2.0);
 }
