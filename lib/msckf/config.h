@@ -39,7 +39,7 @@ struct MsckfVehicle {
 struct MsckfWindow {
   int clones = 12;                ///< poses kept
   double clone_interval = 0.07;   ///< s between two poses, at least
-  int landmarks = 30;             ///< long-lived points in the state
+  int landmarks = 0;              ///< long-lived points in the state; right where errors of tracks are white (MODEL.md)
   int points_per_update = 40;     ///< finished tracks used at one time, longest first
   double sigma_px = 1.0;          ///< of a track's image coordinate
   double gate = 0.99;             ///< probability below which a point's residual is taken for noise

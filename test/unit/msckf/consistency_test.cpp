@@ -61,6 +61,14 @@ TEST_CASE("errors of fifty visual-inertial drives are what the covariance says")
   CHECK(all(o) < 1.6);
 }
 
+TEST_CASE("with long-lived points errors are what the covariance says, where those of the tracks are white") {
+  const Outcome o = drive_all(kDrives, [](MsckfConfig& c) { c.window.landmarks = 30; });
+  print("long-lived points", o);
+  CHECK(o.running == kDrives);
+  CHECK(all(o) > 0.8);
+  CHECK(all(o) < 1.6);
+}
+
 TEST_CASE("the consistency test sees pixel noise that is more than the filter is told") {
   const Outcome o = drive_all(kSiblings, [](MsckfConfig& c) {
     c.window.sigma_px *= kTooQuiet;

@@ -40,12 +40,14 @@ TEST_CASE("parked from the first second: a valid pose that stays where it is") {
   CHECK(worst < 0.01);
 }
 
-TEST_CASE("a city street is followed, mono and stereo, and wheels help") {
+TEST_CASE("a city street is followed, mono and stereo, with long-lived points and without") {
   for (const bool stereo : {false, true}) {
     test::VisualDriveConfig car = test::city_drive(60.0);
     car.stereo = stereo;
     const test::VisualDrive drive = test::make_drive(car, 2);
-    Msckf filter(test::filter_config(car));
+    MsckfConfig config = test::filter_config(car);
+    config.window.landmarks = GENERATE(0, 30);
+    Msckf filter(config);
     const MsckfOutput out = drive_through(filter, drive, false);
     REQUIRE(out.odometry.validity == Validity::kValid);
     CHECK(out.reset_counter == 0);
