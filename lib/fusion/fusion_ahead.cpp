@@ -113,6 +113,11 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   const double wander = config_.motion.jerk * silent;  // of a speed that nobody tells
   f.speed_variance = P(3, 3) + wander * wander;
   if (!s.velocity || silent > 0.0) f.speed_variance += config_.speed_sigma * config_.speed_sigma;
+  if (told && s.velocity) {  // after a gap, say: the state hears of it only when the horizon is there
+    const Eigen::Vector2d grown = grown_velocity_variance(*a.felt);
+    f.planar.P.diagonal().head<2>() += heard * heard * grown;
+    if (silent <= 0.0) f.speed_variance += F.block<1, 2>(3, *s.velocity).cwiseAbs2().dot(grown.transpose());
+  }
   return f;
 }
 

@@ -49,6 +49,12 @@ bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const
          memory(other).yaw_rate_variance < variance;
 }
 
+Eigen::Vector2d Fusion::grown_velocity_variance(const Odometry& ins) const {
+  const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
+  const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
+  return (P - memory(FusionChannel::kIns).velocity_covariance).diagonal().cwiseMax(0.0);
+}
+
 /// The errors of the INS velocity and of its gyro last while no fix corrects them: their variances grow as the INS
 /// says; where a fix did, or the INS came to stand, what was known of them is void.
 void Fusion::follow_ins_errors(const Odometry& ins, double dt) {
@@ -57,7 +63,7 @@ void Fusion::follow_ins_errors(const Odometry& ins, double dt) {
   const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
   const double drift_variance = ins_drift_std_ * ins_drift_std_;
   const bool redone = ins_corrected_ || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
-  const Eigen::Vector2d grown = (P - m.velocity_covariance).diagonal().cwiseMax(0.0);
+  const Eigen::Vector2d grown = grown_velocity_variance(ins);
   const double drift_grown = std::max(0.0, drift_variance - m.drift_variance);
   distrust_ *= std::exp(-dt / kDistrustTime);
   for (Mode& mode : imm_.modes) {
