@@ -1,4 +1,4 @@
-// Numbers that no device can mean, in frames whose checksums are right: found by the fuzz targets of test/fuzz.
+// Numbers that no device can mean, in frames whose checksums are right, as the promises of test/fuzz have them.
 #include <catch2/catch.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/pose_t.hpp>
