@@ -14,6 +14,7 @@
 #include "geometry/determinism.h"
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"
+#include "program.h"
 #include "simulation/scenarios.h"
 #include "slam/keyframe_tracker.h"
 #include "support/simulated_tracks.h"
@@ -147,11 +148,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace roadfix
 
-int main(int argc, char** argv) {
-  try {
-    return roadfix::run(argc, argv);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "fusion_tracks: %s\n", e.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return roadfix::bench::run_as("fusion_tracks", roadfix::run, argc, argv); }

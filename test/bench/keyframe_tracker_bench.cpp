@@ -16,19 +16,13 @@
 
 #include "evaluation/alignment.h"
 #include "geometry/determinism.h"
+#include "program.h"
 #include "slam/keyframe_tracker.h"
 
 namespace roadfix {
 namespace {
 
-double cpu_ms() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto ms = [](const timeval& t) {
-    return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_usec);
-  };
-  return ms(usage.ru_utime) + ms(usage.ru_stime);
-}
+using bench::cpu_ms;
 
 struct Sequence {
   CameraRig rig;
@@ -209,11 +203,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace roadfix
 
-int main(int argc, char** argv) {
-  try {
-    return roadfix::run(argc, argv);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "keyframe_tracker_bench: %s\n", e.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return roadfix::bench::run_as("keyframe_tracker_bench", roadfix::run, argc, argv); }

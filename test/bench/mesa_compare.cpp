@@ -3,12 +3,12 @@
 /// thread, and the share of pixels on which their depths agree. Built where libosmesa6-dev is installed.
 ///   LP_NUM_THREADS=0 mesa_compare
 #include <GL/osmesa.h>
-#include <sys/resource.h>
 
 #include <cmath>
 #include <cstdio>
 #include <limits>
 
+#include "program.h"
 #include "simulation/scenarios.h"
 #include "simulation/scene/drive_scene.h"
 
@@ -19,12 +19,7 @@ constexpr float kNear_m = 0.3F;
 constexpr float kFar_m = 900.0F;
 constexpr int kPictures = 40;
 
-double cpu_ms() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return 1e3 * static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-3 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
+using bench::cpu_ms;
 
 /// Pinhole of the camera as OpenGL's clip space, rows from the bottom up.
 Eigen::Matrix4f projection(const CameraIntrinsics& c) {

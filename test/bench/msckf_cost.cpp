@@ -2,8 +2,6 @@
 ///   msckf_cost LOG VEHICLE_FOLDER
 /// From before the first message to after the last, the whole process, all outputs made and thrown away. Pictures come
 /// raw, as a camera gives them: what a JPEG or PNG costs to open is printed apart.
-#include <sys/resource.h>
-
 #include <cstdio>
 #include <roadfix/image_t.hpp>
 
@@ -11,20 +9,14 @@
 #include "bus/message.h"
 #include "bus/stage_runner.h"
 #include "geometry/determinism.h"
+#include "program.h"
 #include "vo_tracker/handler.h"
 #include "vo_tracker/picture.h"
 
 namespace roadfix {
 namespace {
 
-double cpu_ms() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto ms = [](const timeval& t) {
-    return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_usec);
-  };
-  return ms(usage.ru_utime) + ms(usage.ru_stime);
-}
+using bench::cpu_ms;
 
 class Nowhere final : public MessageSink {
  public:
@@ -82,11 +74,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace roadfix
 
-int main(int argc, char** argv) {
-  try {
-    return roadfix::run(argc, argv);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "msckf_cost: %s\n", e.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return roadfix::bench::run_as("msckf_cost", roadfix::run, argc, argv); }

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "geometry/determinism.h"
+#include "program.h"
 #include "simulation/random.h"
 #include "support/visual_drive.h"
 
@@ -103,11 +104,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace roadfix
 
-int main(int argc, char** argv) {
-  try {
-    return roadfix::run(argc, argv);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "msckf_drives: %s\n", e.what());
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return roadfix::bench::run_as("msckf_drives", roadfix::run, argc, argv); }
