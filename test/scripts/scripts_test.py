@@ -58,15 +58,24 @@ class ReadmeTables(unittest.TestCase):
             done = subprocess.run(command, input=measured, text=True, capture_output=True, check=False)
             return readme.read_text(), done
 
-    TEXT = "before\n<!-- figures first_light -->\nold\n<!-- end -->\nafter\n"
+    TEXT = (
+        "before\n<!-- figures all -->\n| figure | measured (wanted) | figure | measured (wanted) |\n|---|---|---|---|\n"
+        "| `first_light.car_h_m` | 0.2 m (<=0.15) | `gnss_ins.nees` | **0.7 ratio (0.8..1.3)** |\n<!-- end -->\nafter\n"
+    )
     ROW = "first_light.car_h_m\t0.1\tm\t<=0.15\tyes\n"
 
-    def test_a_table_goes_between_its_markers_and_nowhere_else(self):
+    def test_a_measured_figure_replaces_its_own_and_no_other(self):
         text, _ = self.run_on(self.TEXT, self.ROW)
-        self.assertIn("| `first_light.car_h_m` | 0.1 | m | <=0.15 | yes |", text)
-        self.assertNotIn("old", text)
-        self.assertTrue(text.startswith("before\n<!-- figures first_light -->\n"))
-        self.assertTrue(text.endswith("<!-- end -->\nafter\n"))
+        self.assertEqual(text, self.TEXT.replace("0.2 m", "0.1 m"))
+
+    def test_a_new_figure_stands_with_its_name_and_a_miss_in_bold(self):
+        text, _ = self.run_on(self.TEXT, "first_light.xrt\t100\tx\t>=200\tno\n")
+        self.assertIn("| `first_light.car_h_m` | 0.2 m (<=0.15) | `first_light.xrt` | **100 x (>=200)** |\n", text)
+        self.assertIn("| `gnss_ins.nees` | **0.7 ratio (0.8..1.3)** | | |\n", text)
+
+    def test_a_skipped_figure_keeps_no_old_value(self):
+        text, _ = self.run_on(self.TEXT, "gnss_ins.nees\t-\tratio\t0.8..1.3\tskipped\n")
+        self.assertIn("| `gnss_ins.nees` | skipped (0.8..1.3) |", text)
 
     def test_without_rows_the_old_table_stays(self):
         text, _ = self.run_on(self.TEXT, "")
@@ -79,7 +88,7 @@ class ReadmeTables(unittest.TestCase):
 
     def test_a_missing_marker_is_named(self):
         _, done = self.run_on("nothing\n", self.ROW)
-        self.assertIn("no marker for first_light", done.stderr)
+        self.assertIn("no marker for figures", done.stderr)
 
 
 if __name__ == "__main__":
