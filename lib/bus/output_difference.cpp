@@ -102,10 +102,10 @@ std::string difference_in_words(const StageSpec& spec, const RecordedOutput& rec
 
 std::string loss_in_words(const StageSpec& spec, const LogLoss& loss) {
   const std::string& channel = spec.inputs[static_cast<std::size_t>(loss.input)].channel;
+  if (loss.last_seq == std::numeric_limits<int64_t>::max()) return channel + ": not in the log";
   if (loss.first_seq == std::numeric_limits<int64_t>::min()) {
     return channel + ": the log begins with seq " + std::to_string(loss.last_seq + 1);
   }
-  if (loss.last_seq == std::numeric_limits<int64_t>::max()) return channel + ": not in the log";
   return channel + ": " + seqs_in_words(loss.first_seq, loss.last_seq) + " not in the log";
 }
 
