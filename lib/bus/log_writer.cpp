@@ -12,7 +12,9 @@ namespace roadfix {
 
 namespace {
 
-constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
+/// Small enough to be full, and so in memory, after the first second of a drive: what it takes never grows.
+constexpr std::size_t kBufferBytes = std::size_t{64} << 10;
+constexpr const char* kNotTaken = "cannot write the log";
 
 void store(uint8_t* to, uint64_t value, int size) {
   for (int i = 0; i < size; ++i) to[i] = static_cast<uint8_t>(value >> (8 * (size - 1 - i)));
@@ -66,24 +68,37 @@ void LogWriter::write(std::string_view channel, int64_t timestamp_us, std::span<
 void LogWriter::put(const void* data, std::size_t size) {
   if (buffer_.size() + size > kBufferBytes) flush(false);
   const auto* begin = static_cast<const uint8_t*>(data);
-  buffer_.insert(buffer_.end(), begin, begin + size);
+  if (size > kBufferBytes) {
+    // A buffer that took it would keep the size of the largest message ever.
+    if (hand_out({begin, size}) < size) throw_log_error(written_path_, kNotTaken);
+  } else {
+    buffer_.insert(buffer_.end(), begin, begin + size);
+  }
   bytes_ += size;
   hash_.add(data, size);
 }
 
-void LogWriter::flush(bool to_disk) {
+/// How much of it the system took; less than all: errno says why.
+std::size_t LogWriter::hand_out(std::span<const uint8_t> data) const {
   std::size_t done = 0;
-  while (done < buffer_.size()) {
-    const ssize_t n = ::write(fd_, buffer_.data() + done, buffer_.size() - done);
+  while (done < data.size()) {
+    const ssize_t n = ::write(fd_, data.data() + done, data.size() - done);
     if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) {
-      buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(done));
-      throw_log_error(written_path_, "cannot write the log");
-    }
+    if (n <= 0) break;
     done += static_cast<std::size_t>(n);
   }
+  return done;
+}
+
+void LogWriter::flush(bool to_disk) {
+  if (const std::size_t done = hand_out(buffer_); done < buffer_.size()) {
+    const int why = errno;
+    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(done));
+    errno = why;
+    throw_log_error(written_path_, kNotTaken);
+  }
   buffer_.clear();
-  if (to_disk && ::fdatasync(fd_) != 0 && errno != EINVAL) throw_log_error(written_path_, "cannot write the log");
+  if (to_disk && ::fdatasync(fd_) != 0 && errno != EINVAL) throw_log_error(written_path_, kNotTaken);
 }
 
 void LogWriter::commit() {

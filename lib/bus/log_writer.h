@@ -38,6 +38,7 @@ class LogWriter {
 
  private:
   void put(const void* data, std::size_t size);
+  [[nodiscard]] std::size_t hand_out(std::span<const uint8_t> data) const;
 
   std::filesystem::path path_;
   std::filesystem::path written_path_;

@@ -173,7 +173,7 @@ int record(const Options& options) {
   service.stopping();
   const bool early = recording.stopped().has_value();
   recording.finish();
-  std::cout << "recorded " << recording.recording().files().size() << " files" << std::endl;
+  std::cout << "recorded " << recording.recording().files_begun() << " files" << std::endl;
   if (const int64_t unwritten = recording.recording().unwritten(); unwritten > 0) {
     std::cerr << "recorder: " << unwritten << " messages did not reach the disk" << std::endl;
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "recorder/sidecar.h"
@@ -15,6 +16,12 @@ namespace {
 constexpr double kMicrosecond = 1e-6;
 /// What must be free beyond the least before a stopped recording goes on: some seconds of a drive.
 constexpr double kRoom = 8.0 * kMebi;
+
+/// "20260101T000000Z.012.lcm": its drive, whose name begins with the UTC time of its start, and its number in it.
+std::pair<std::string, int64_t> place_of(const fs::path& log) {
+  const fs::path name = log.stem();
+  return {name.stem().string(), std::atoll(name.extension().string().substr(name.has_extension() ? 1 : 0).c_str())};
+}
 
 }  // namespace
 
@@ -36,8 +43,9 @@ Recording::Recording(const RecorderConfig& config, const std::string& name, Free
 Recording::~Recording() { close(); }
 
 void Recording::open_next() {
-  const fs::path path = folder_ / fmt::format("{}.{:03}.lcm", name_, files_.size());
+  const fs::path path = folder_ / fmt::format("{}.{:03}.lcm", name_, files_begun_);
   log_ = std::make_unique<LogWriter>(path, LogWriter::Mode::kRecording);
+  ++files_begun_;
   files_.push_back(path);
   facts_.emplace_back().name = path.filename().string();
   write_sidecar();
@@ -125,9 +133,18 @@ bool Recording::delete_oldest() {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
     if (entry.path().extension() == ".lcm" && entry.path() != files_.back()) logs.push_back(entry.path());
-  // Names begin with the UTC time of their start: the alphabet is the calendar.
-  const auto oldest = std::min_element(logs.begin(), logs.end());
-  return oldest != logs.end() && fs::remove(*oldest, error);
+  const auto oldest = std::min_element(logs.begin(), logs.end(),
+                                       [](const fs::path& a, const fs::path& b) { return place_of(a) < place_of(b); });
+  if (oldest == logs.end() || !fs::remove(*oldest, error)) return false;
+  forget(*oldest);
+  return true;
+}
+
+void Recording::forget(const fs::path& file) {
+  const auto ours = std::find(files_.begin(), files_.end(), file);
+  if (ours == files_.end()) return;
+  facts_.erase(facts_.begin() + (ours - files_.begin()));
+  files_.erase(ours);
 }
 
 std::string Recording::lack_of_space() const {
@@ -168,6 +185,7 @@ void Recording::write_sidecar() const {
   if (reason_.empty() && !earlier_reason_.empty()) sidecar.stopped_because = "for a while: " + earlier_reason_;
   sidecar.dropped = dropped_;
   sidecar.unwritten = unwritten_;
+  sidecar.deleted_files = files_begun_ - static_cast<int64_t>(files_.size());
   for (const FileFacts& f : facts_) sidecar.files.push_back({f.name, f.first_us, f.last_us, f.bytes, f.hash, f.events});
   roadfix::write_sidecar(folder_ / (name_ + ".json"), sidecar);
 }

@@ -52,7 +52,9 @@ class Recording {
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] const std::string& reason() const { return reason_; }  ///< why it stopped
   [[nodiscard]] int64_t unwritten() const { return unwritten_; }       ///< messages that came after the stop
+  /// That are there: what when_full: delete_oldest took is forgotten, so that a drive may last for ever.
   [[nodiscard]] const std::vector<std::filesystem::path>& files() const { return files_; }
+  [[nodiscard]] int64_t files_begun() const { return files_begun_; }
 
  private:
   struct FileFacts {
@@ -70,6 +72,7 @@ class Recording {
   [[nodiscard]] std::string lack_of_space() const;
   void check_space();
   bool delete_oldest();
+  void forget(const std::filesystem::path& file);
   [[nodiscard]] uint64_t recorded_bytes() const;
   void write_sidecar() const;
 
@@ -79,7 +82,8 @@ class Recording {
   FreeSpace free_;
   std::unique_ptr<LogWriter> log_;
   std::vector<std::filesystem::path> files_;
-  std::vector<FileFacts> facts_;
+  std::vector<FileFacts> facts_;  ///< of each of files_
+  int64_t files_begun_ = 0;
   std::map<std::string, int64_t> dropped_;
   State state_ = State::kRecording;
   std::string reason_;

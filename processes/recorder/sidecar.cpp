@@ -20,6 +20,7 @@ void write_sidecar(const std::filesystem::path& path, const Sidecar& sidecar) {
   json["stopped_because"] = sidecar.stopped_because;
   json["unwritten"] = sidecar.unwritten;
   json["dropped"] = sidecar.dropped;
+  json["deleted_files"] = sidecar.deleted_files;
   for (const SidecarFile& file : sidecar.files)
     json["files"].push_back({{"name", file.name},
                              {"first_utime", file.first_us},

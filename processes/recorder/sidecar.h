@@ -21,6 +21,7 @@ struct SidecarFile {
 
 struct Sidecar {
   std::vector<SidecarFile> files;
+  int64_t deleted_files = 0;               ///< before these, for want of room (when_full: delete_oldest)
   std::map<std::string, int64_t> dropped;  ///< per channel: did not fit into memory while the disk was slow
   int64_t unwritten = 0;                   ///< came after the recording had stopped
   std::string stopped_because;             ///< empty: stopped on request, or still running

@@ -117,8 +117,28 @@ TEST_CASE("over its quota a recording stops, or deletes the oldest files") {
   for (const auto& entry : fs::directory_iterator(folder.path()))
     if (entry.path().extension() == ".lcm") bytes += entry.file_size();
   CHECK(static_cast<double>(bytes) < 4.0 * kMebi);
-  CHECK(fs::exists(recording.files().back()));
-  CHECK(fs::exists(recording.files().front()) != ring);
+  CHECK((recording.files_begun() > 5) == ring);
+  CHECK(fs::exists(folder.path() / "a.000.lcm") != ring);
+  for (const fs::path& file : recording.files()) CHECK(fs::exists(file));
+  recording.close();
+  const nlohmann::json facts = sidecar(folder.path() / "a.json");
+  CHECK(facts["files"].size() == recording.files().size());
+  CHECK(facts["deleted_files"] == recording.files_begun() - static_cast<int64_t>(recording.files().size()));
+  CHECK((facts["deleted_files"] > 0) == ring);
+}
+
+TEST_CASE("the oldest file goes first, also behind the thousandth") {
+  const Folder folder;
+  RecorderConfig config = folder.config();
+  config.quota = 1.5 / 1024.0;
+  config.when_full = WhenFull::kDeleteOldest;
+  fs::create_directories(folder.path());
+  for (const char* name : {"a.999.lcm", "a.1000.lcm"}) {
+    std::ofstream(folder.path() / name) << std::string(1 << 20, ' ');
+  }
+  const Recording recording(config, "b");
+  CHECK_FALSE(fs::exists(folder.path() / "a.999.lcm"));
+  CHECK(fs::exists(folder.path() / "a.1000.lcm"));
 }
 
 TEST_CASE("once there is room again, a stopped recording goes on in a new file, and the sidecar tells of the hole") {
