@@ -14,8 +14,6 @@ constexpr int64_t kConfig_us = 10'000'000;
 constexpr int64_t kLook_us = 100'000;
 /// What a message caused (two publishers, an overload) is told for this long.
 constexpr int64_t kTrouble_us = 700'000;
-/// And what was not sent until some heartbeats have come through again.
-constexpr int64_t kUnsent_us = 3'000'000;
 /// Without a tick for this long a stage says so; shorter gaps are ordinary.
 constexpr int64_t kNoClock_us = 1'000'000;
 /// So many clock samples in a row, all that much older than the clock: the stamps have gone back (a log played again, a
@@ -213,14 +211,20 @@ void LiveStage::note_trouble(int64_t now_utime) {
     }
     counted_[i] = counters;
   }
-  if (const int64_t unsent = bus_.unsent(); unsent > unsent_) {
-    trouble_ = "the network did not take " + std::to_string(unsent) + " messages";
-    trouble_until_us_ = now_utime + kUnsent_us;
-    unsent_ = unsent;
-  }
+  unsent_.note(now_utime, bus_.unsent());
 }
 
+/// A network that is gone takes the inputs with it: what was not sent is told beside whatever else is the matter.
 std::pair<int8_t, std::string> LiveStage::state(int64_t now_utime) const {
+  std::pair<int8_t, std::string> all = state_of_inputs(now_utime);
+  const std::string unsent = unsent_.trouble(now_utime);
+  if (unsent.empty()) return all;
+  if (all.first == heartbeat_t::STATE_RUNNING) all.first = heartbeat_t::STATE_DEGRADED;
+  all.second += (all.second.empty() ? "" : "; ") + unsent;
+  return all;
+}
+
+std::pair<int8_t, std::string> LiveStage::state_of_inputs(int64_t now_utime) const {
   const InputStream& stream = runner_->stream();
   if (now_utime - std::max(last_tick_us_, started_us_) > kNoClock_us) {
     std::string clocks;

@@ -18,6 +18,7 @@
 #include "bus/run_clock.h"
 #include "bus/stage_memory.h"
 #include "bus/stage_runner.h"
+#include "bus/unsent_watch.h"
 #include "stream/lateness_watch.h"
 #include "stream/overload_choice.h"
 
@@ -56,7 +57,8 @@ class LiveStage : public MessageSink {
   void fill_inputs(heartbeat_t& heartbeat);
   void publish_config(int64_t now_utime);
   void note_trouble(int64_t now_utime);
-  std::pair<int8_t, std::string> state(int64_t now_utime) const;
+  [[nodiscard]] std::pair<int8_t, std::string> state(int64_t now_utime) const;
+  [[nodiscard]] std::pair<int8_t, std::string> state_of_inputs(int64_t now_utime) const;
 
   Bus& bus_;
   RunClock clock_;
@@ -76,7 +78,7 @@ class LiveStage : public MessageSink {
   int64_t started_us_ = 0;
   int64_t last_tick_us_ = 0;            ///< of the run clock, when the newest tick came
   std::vector<InputCounters> counted_;  ///< at the last look
-  int64_t unsent_ = 0;                  ///< at the last look
+  UnsentWatch unsent_;
   std::string trouble_;
   int64_t trouble_until_us_ = 0;
   int8_t told_state_ = -1;

@@ -33,7 +33,9 @@ void HealthPublisher::publish_heartbeat(int64_t now_us) {
   heartbeat.utime = now_us;
   heartbeat.run = run_;
   heartbeat.seq = heartbeat_seq_++;
-  heartbeat.state = heartbeat_t::STATE_RUNNING;
+  unsent_.note(now_us, bus_.unsent());
+  heartbeat.state_reason = unsent_.trouble(now_us);
+  heartbeat.state = heartbeat.state_reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;
   heartbeat.cpu_share = load_.cpu_share();
   heartbeat.rss_bytes = resident_bytes();
   heartbeat.kernel_drops = bus_.kernel_drops();

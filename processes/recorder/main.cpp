@@ -3,23 +3,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <ctime>
 #include <iostream>
-#include <mutex>
-#include <optional>
-#include <roadfix/heartbeat_t.hpp>
-#include <thread>
 
-#include "bus/message.h"
 #include "bus/network_bus.h"
-#include "bus/process_facts.h"
 #include "bus/run_clock.h"
 #include "bus/run_process.h"
 #include "bus/service.h"
 #include "config/config.h"
-#include "recorder/message_queue.h"
-#include "recorder/recording.h"
+#include "recorder/recorder_heartbeat.h"
+#include "recorder/recording_thread.h"
 
 namespace roadfix {
 namespace {
@@ -27,7 +20,6 @@ namespace {
 constexpr auto kPatience = std::chrono::milliseconds(50);
 /// Four times as often as a stage: it has no output whose silence would tell that it died.
 constexpr int64_t kHeartbeat_us = 250'000;
-constexpr int64_t kTryAgain_us = 500'000;
 constexpr int kUserError = 2;
 /// The recording ended before it was told to: disk full, quota used up.
 constexpr int kStoppedEarly = 3;
@@ -39,99 +31,6 @@ struct Options {
   int realtime = 0;
   bool print_config = false;
 };
-
-/// One recording on its own thread, fed by a queue. The bus thread never waits for the disk.
-class RecordingThread {
- public:
-  RecordingThread(const RecorderConfig& config, const std::string& name)
-      : queue_(static_cast<std::size_t>(config.memory * kMebi)),
-        recording_(config, name),
-        thread_([this] { work(); }) {}
-  ~RecordingThread() { finish(); }
-  RecordingThread(const RecordingThread&) = delete;
-  RecordingThread& operator=(const RecordingThread&) = delete;
-
-  void push(const BusMessage& message) {
-    queue_.push(std::string(message.channel), message.received_us, message.bytes);
-  }
-
-  /// Waits until everything queued is on the disk.
-  void finish() {
-    done_ = true;
-    if (thread_.joinable()) thread_.join();
-  }
-
-  /// Why nothing is recorded; absent while it is.
-  [[nodiscard]] std::optional<std::string> stopped() const {
-    const std::lock_guard lock(mutex_);
-    return stopped_;
-  }
-  [[nodiscard]] const MessageQueue& queue() const { return queue_; }
-  /// Only after finish().
-  [[nodiscard]] const Recording& recording() const { return recording_; }
-
- private:
-  void work() {
-    RunClock clock;
-    while (true) {
-      const bool last_round = done_;
-      while (const std::optional<QueuedMessage> message =
-                 queue_.pop(last_round ? std::chrono::milliseconds(0) : kPatience)) {
-        recording_.write(message->channel, message->received_us, message->data);
-        recording_.flush(clock.now_utime());
-        look(clock.now_utime());
-      }
-      recording_.flush(clock.now_utime());
-      look(clock.now_utime());
-      if (last_round) break;
-    }
-    recording_.note_dropped(queue_.dropped());
-    recording_.close();
-  }
-
-  void look(int64_t now_us) {
-    bool stopped = recording_.state() == Recording::State::kStopped;
-    if (stopped && now_us - tried_us_ > kTryAgain_us) {
-      tried_us_ = now_us;
-      stopped = !recording_.try_again();
-    }
-    const std::lock_guard lock(mutex_);
-    if (stopped != stopped_.has_value()) stopped_ = stopped ? std::optional(recording_.reason()) : std::nullopt;
-  }
-
-  MessageQueue queue_;
-  Recording recording_;
-  int64_t tried_us_ = 0;
-  mutable std::mutex mutex_;
-  std::optional<std::string> stopped_;
-  std::atomic<bool> done_ = false;
-  std::thread thread_;
-};
-
-/// HEARTBEAT_RECORDER: degraded once something did not reach the disk.
-void publish_heartbeat(NetworkBus& bus, RunClock& clock, ProcessLoad& load, const RecordingThread& recording,
-                       int64_t seq) {
-  heartbeat_t heartbeat{};
-  heartbeat.utime = clock.now_utime();
-  heartbeat.run = clock.run();
-  heartbeat.seq = seq;
-  int64_t dropped = 0;
-  for (const auto& [channel, count] : recording.queue().dropped()) dropped += count;
-  heartbeat.state = heartbeat_t::STATE_RUNNING;
-  if (dropped > 0 || bus.kernel_drops() > 0) {
-    heartbeat.state = heartbeat_t::STATE_DEGRADED;
-    heartbeat.state_reason = fmt::format("{} messages did not fit into memory, the kernel dropped {} datagrams",
-                                         dropped, bus.kernel_drops());
-  }
-  if (const std::optional<std::string> reason = recording.stopped()) {
-    heartbeat.state = heartbeat_t::STATE_DEGRADED;
-    heartbeat.state_reason = "not recording: " + *reason;
-  }
-  heartbeat.cpu_share = load.cpu_share();
-  heartbeat.rss_bytes = resident_bytes();
-  heartbeat.kernel_drops = bus.kernel_drops();
-  bus.publish("HEARTBEAT_RECORDER", encode(heartbeat));
-}
 
 int record(const Options& options) {
   RecorderConfig config;
@@ -146,7 +45,7 @@ int record(const Options& options) {
   if (options.realtime > 0) make_realtime(options.realtime);
   NetworkBus bus(options.bus);
   RunClock clock;
-  ProcessLoad load;
+  RecorderHeartbeat heartbeat;
   const std::string name = fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
   RecordingThread recording(config, name);
   QueuePolicy unlimited;
@@ -159,7 +58,7 @@ int record(const Options& options) {
   service.ready("recording to " + config.folder);
   int64_t next_heartbeat_us = 0;
   bool stopped = false;
-  for (int64_t seq = 0; !stop_requested();) {
+  while (!stop_requested()) {
     bus.handle(kPatience);
     service.alive();
     const std::optional<std::string> reason = recording.stopped();
@@ -168,7 +67,7 @@ int record(const Options& options) {
     if (changed) std::cerr << "recorder: " << (stopped ? "stopped: " + *reason : "records again") << std::endl;
     if (!changed && clock.now_utime() < next_heartbeat_us) continue;
     next_heartbeat_us = clock.now_utime() + kHeartbeat_us;
-    publish_heartbeat(bus, clock, load, recording, seq++);
+    heartbeat.publish(bus, clock, recording.queue().dropped(), reason);
   }
   service.stopping();
   const bool early = recording.stopped().has_value();

@@ -90,11 +90,16 @@ void LiveDriver::publish_heartbeat(int64_t now_utime, bool stopping) {
   h.run = clock_.run();
   h.seq = heartbeat_seq_++;
   h.state_reason = trouble();
+  unsent_.note(now_utime, bus_.unsent());
+  if (const std::string unsent = unsent_.trouble(now_utime); !unsent.empty()) {
+    h.state_reason += (h.state_reason.empty() ? "" : "; ") + unsent;
+  }
   h.state = h.state_reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;
   if (session_.openings() == 0) h.state = heartbeat_t::STATE_STARTING;
   if (stopping) h.state = heartbeat_t::STATE_STOPPING;
   h.cpu_share = load_.cpu_share();
   h.rss_bytes = resident_bytes();
+  h.kernel_drops = bus_.kernel_drops();
   const std::vector<StreamCounters> rows =
       reader_.driver() ? reader_.driver()->counters() : std::vector<StreamCounters>();
   for (const StreamCounters& row : rows) {

@@ -4,6 +4,7 @@
 #include "bus/bus.h"
 #include "bus/process_facts.h"
 #include "bus/run_clock.h"
+#include "bus/unsent_watch.h"
 #include "drivers/device/device_session.h"
 #include "drivers/device/driver.h"
 
@@ -20,7 +21,7 @@ class LiveDriver {
   /// A last heartbeat.
   void stop();
 
-  /// In plain words what is the matter; empty where all is well.
+  /// In plain words what is the matter with the device; empty where all is well.
   [[nodiscard]] std::string trouble() const;
   [[nodiscard]] std::string device_name() const { return session_.name(); }
   /// How often the device was opened.
@@ -50,6 +51,7 @@ class LiveDriver {
   Bus& bus_;
   RunClock clock_;
   ProcessLoad load_;
+  UnsentWatch unsent_;
   BusOutputs outputs_;
   RawReader reader_;
   DeviceSession session_;

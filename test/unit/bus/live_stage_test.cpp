@@ -5,6 +5,7 @@
 #include "bus/log_bus.h"
 #include "bus/memory_bus.h"
 #include "support/chain_stage.h"
+#include "support/outage_bus.h"
 #include "support/small_drive.h"
 #include "support/temporary_folder.h"
 
@@ -131,4 +132,24 @@ TEST_CASE("a recorded log is a bus: its order of arrival gives the same outputs 
   }
   REQUIRE(bytes[0].size() > 10'000);
   REQUIRE(bytes[0] == bytes[1]);
+}
+
+TEST_CASE("what the network did not take is told until some heartbeats came through") {
+  UnsentWatch watch;
+  watch.note(1'000'000, 0);
+  REQUIRE(watch.trouble(1'000'000).empty());
+  watch.note(2'000'000, 7);
+  REQUIRE(watch.trouble(4'900'000) == "the network did not take 7 messages");
+  watch.note(4'900'000, 7);
+  REQUIRE(watch.trouble(5'100'000).empty());
+
+  for (const bool gone : {true, false}) {
+    OutageBus bus;
+    LiveStage live(make_filter, bus);
+    bus.gone = gone;
+    live.step(std::chrono::milliseconds(0));  // a heartbeat and the configuration
+    bus.gone = false;
+    const auto told = last_of<heartbeat_t>(bus, "HEARTBEAT_FILTER", [&] { live.stop(); }).state_reason;
+    REQUIRE((told.find("did not take 2 messages") != std::string::npos) == gone);
+  }
 }

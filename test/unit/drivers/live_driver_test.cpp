@@ -19,6 +19,7 @@
 #include "drivers/imu_driver/handler.h"
 #include "drivers/wheel_driver/handler.h"
 #include "support/driver_bench.h"
+#include "support/outage_bus.h"
 
 namespace roadfix {
 namespace {
@@ -71,6 +72,22 @@ TEST_CASE("a pseudo-terminal end to end: raw bytes, samples, and the same sample
   while (sample->channel != "RAW_IMU") --sample;
   bench.sent.erase(sample);
   CHECK(replayed(bench).size() == live.size() - 1);
+}
+
+TEST_CASE("what the network did not take is told in the heartbeat, beside the device's own trouble") {
+  ImuDriverConfig config;
+  config.device = quick("/nowhere/imu");
+  const DriverSetup setup = imu_driver_setup(config);
+  for (const bool gone : {true, false}) {
+    test::OutageBus bus;
+    LiveDriver driver(setup, bus);
+    bus.gone = gone;
+    driver.step(std::chrono::milliseconds(0));  // a heartbeat and the configuration
+    bus.gone = false;
+    const auto h = test::last_of<heartbeat_t>(bus, "HEARTBEAT_IMU_DRIVER", [&] { driver.stop(); });
+    CHECK_THAT(h.state_reason, Catch::Contains("/nowhere/imu"));
+    CHECK((h.state_reason.find("the network did not take 2 messages") != std::string::npos) == gone);
+  }
 }
 
 TEST_CASE("unplugged and plugged in again: said in the heartbeat, opened again with pauses") {

@@ -7,7 +7,9 @@
 #include "bus/message.h"
 #include "config/config.h"
 #include "monitor/handler.h"
+#include "monitor/health_publisher.h"
 #include "monitor/messages.h"
+#include "support/outage_bus.h"
 #include "support/shared_data.h"
 #include "support/temporary_folder.h"
 
@@ -149,4 +151,20 @@ TEST_CASE("a vehicle's folder says what to expect") {
   const auto example = load_config<MonitorConfig>(test::source_path("configs/example/monitor.yaml"));
   CHECK(example.channels.front().name == "POSE_VO");
   CHECK(example.health.process.disk_gib == 20.0);
+}
+
+TEST_CASE("the monitor says what the network did not take of its own messages") {
+  for (const bool gone : {true, false}) {
+    test::OutageBus bus;
+    HealthPublisher publisher(bus, 0.5, true);
+    HealthReport report;
+    bus.gone = gone;
+    report.now_us = kStart_us;
+    publisher.decided(report, true);  // HEALTH and a heartbeat
+    bus.gone = false;
+    report.now_us += 1'000'000;
+    const auto h = test::last_of<heartbeat_t>(bus, "HEARTBEAT_MONITOR", [&] { publisher.decided(report, true); });
+    CHECK(h.state == (gone ? heartbeat_t::STATE_DEGRADED : heartbeat_t::STATE_RUNNING));
+    CHECK(h.state_reason == (gone ? "the network did not take 2 messages" : ""));
+  }
 }

@@ -1,0 +1,28 @@
+/// HEARTBEAT_RECORDER: degraded once something did not reach the disk, or the bus.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "bus/bus.h"
+#include "bus/process_facts.h"
+#include "bus/run_clock.h"
+#include "bus/unsent_watch.h"
+
+namespace roadfix {
+
+class RecorderHeartbeat {
+ public:
+  /// `dropped`: messages per channel that did not fit into memory; `stopped`: why nothing is recorded.
+  void publish(Bus& bus, RunClock& clock, const std::map<std::string, int64_t>& dropped,
+               const std::optional<std::string>& stopped);
+
+ private:
+  ProcessLoad load_;
+  UnsentWatch unsent_;
+  int64_t seq_ = 0;
+};
+
+}  // namespace roadfix
