@@ -49,6 +49,22 @@ class Measurements(unittest.TestCase):
                 self.assertIn(f"{path.stem}.{key}", ids)
 
 
+class Test(unittest.TestCase):
+    def run_with(self, *flags):
+        return subprocess.run([ROOT / "scripts" / "test", *flags], text=True, capture_output=True, check=False)
+
+    def test_help_installs_and_builds_nothing(self):
+        done = self.run_with("--help")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("--fuzz[=SECONDS]", done.stdout)
+
+    def test_no_number_of_seconds(self):
+        for seconds in ("", "abc", "0", "-3"):
+            done = self.run_with(f"--fuzz={seconds}")
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(f"'{seconds}'", done.stderr)
+
+
 class ReadmeTables(unittest.TestCase):
     def run_on(self, text, measured, *flags):
         with tempfile.TemporaryDirectory() as folder:
