@@ -1,9 +1,9 @@
 #include "bus/run_process.h"
 
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <iostream>
 
+#include "bus/command_line.h"
 #include "bus/live_stage.h"
 #include "bus/network_bus.h"
 #include "bus/replay.h"
@@ -21,24 +21,14 @@ void note_stop(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-struct Arguments {
-  std::string config;
-  std::string bus = kDefaultBusUrl;
-  std::string memory;
-  std::string log_in;
-  std::string log_out;
-  int realtime = 0;
-  bool print_config = false;
-};
-
-void run_live(const Arguments& arguments, const MakeStage& make, const std::string& name) {
+void run_live(const CommandLine& arguments, const std::string& memory, const MakeStage& make, const std::string& name) {
   if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
   LiveStage live([&] { return make(arguments.config); }, bus);
-  if (!arguments.memory.empty()) {
+  if (!memory.empty()) {
     try {
-      std::filesystem::create_directories(arguments.memory);
-      live.remember_in(std::filesystem::path(arguments.memory) / (name + ".state"));
+      std::filesystem::create_directories(memory);
+      live.remember_in(std::filesystem::path(memory) / (name + ".state"));
     } catch (const std::runtime_error& e) {
       std::cerr << name << ": begins without what it knew: " << e.what() << "\n";
     }
@@ -59,12 +49,12 @@ void run_live(const Arguments& arguments, const MakeStage& make, const std::stri
   live.stop();
 }
 
-void run(const Arguments& arguments, const MakeStage& make) {
+void run(const CommandLine& arguments, const std::string& memory, const MakeStage& make) {
   std::unique_ptr<Stage> stage = make(arguments.config);
   if (arguments.print_config) {
     std::cout << stage->effective_config();
   } else if (arguments.log_in.empty()) {
-    run_live(arguments, make, stage->spec().name);
+    run_live(arguments, memory, make, stage->spec().name);
   } else {
     std::vector<std::unique_ptr<Stage>> stages;
     stages.push_back(std::move(stage));
@@ -81,30 +71,15 @@ void catch_stop_signals() {
 bool stop_requested() { return stop_flag != 0; }
 
 int run_process(int argc, char** argv, const MakeStage& make) {
-  constexpr int kUserError = 2;
   fix_eigen_blocking();
-  Arguments arguments;
-  CLI::App app{"A stage of Roadfix: live on the bus, or over a log"};
-  app.add_option("--config", arguments.config, "The vehicle's configuration folder")->required();
-  app.add_option("--bus", arguments.bus, "LCM URL")->capture_default_str();
-  app.add_option("--memory", arguments.memory, "Folder for what is kept from one start to the next");
-  app.add_option("--realtime", arguments.realtime, "Scheduling priority (SCHED_FIFO); others wait while this runs")
-      ->check(CLI::Range(1, 99));
-  CLI::Option* log_in = app.add_option("--log-in", arguments.log_in, "Read the inputs from this log, not from the bus");
-  CLI::Option* log_out = app.add_option("--log-out", arguments.log_out, "Write the outputs to this log");
-  log_in->needs(log_out);
-  log_out->needs(log_in);
-  app.add_flag("--print-config", arguments.print_config, "Print the effective configuration and end");
-  try {
-    app.parse(argc, argv);
-    run(arguments, make);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : kUserError;
-  } catch (const std::exception& e) {
-    std::cerr << argv[0] << ": " << e.what() << "\n";
-    return kUserError;
-  }
-  return 0;
+  CommandLine arguments("A stage of Roadfix: live on the bus, or over a log", CommandLine::Config::kRequired);
+  std::string memory;
+  arguments.option("--memory", memory, "Folder for what is kept from one start to the next");
+  arguments.add_logs("Read the inputs from this log, not from the bus", "Write the outputs to this log");
+  return arguments.run(argc, argv, [&] {
+    run(arguments, memory, make);
+    return 0;
+  });
 }
 
 }  // namespace roadfix

@@ -2,10 +2,10 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <ctime>
 #include <iostream>
 
+#include "bus/command_line.h"
 #include "bus/network_bus.h"
 #include "bus/run_clock.h"
 #include "bus/run_process.h"
@@ -20,30 +20,23 @@ namespace {
 constexpr auto kPatience = std::chrono::milliseconds(50);
 /// Four times as often as a stage: it has no output whose silence would tell that it died.
 constexpr int64_t kHeartbeat_us = 250'000;
-constexpr int kUserError = 2;
 /// The recording ended before it was told to: disk full, quota used up.
 constexpr int kStoppedEarly = 3;
 
-struct Options {
-  std::filesystem::path vehicle;
-  std::string bus = kDefaultBusUrl;
-  std::string folder;
-  int realtime = 0;
-  bool print_config = false;
-};
-
-int record(const Options& options) {
+int record(const CommandLine& arguments, const std::string& folder) {
   RecorderConfig config;
-  if (!options.vehicle.empty()) config = load_config_or_defaults(options.vehicle / "recorder.yaml", config);
-  if (!options.folder.empty()) config.folder = options.folder;
-  if (options.print_config) {
+  if (!arguments.config.empty()) {
+    config = load_config_or_defaults(std::filesystem::path(arguments.config) / "recorder.yaml", config);
+  }
+  if (!folder.empty()) config.folder = folder;
+  if (arguments.print_config) {
     std::cout << config_text(config);
     return 0;
   }
   catch_stop_signals();
   give_memory_back();
-  if (options.realtime > 0) make_realtime(options.realtime);
-  NetworkBus bus(options.bus);
+  if (arguments.realtime > 0) make_realtime(arguments.realtime);
+  NetworkBus bus(arguments.bus);
   RunClock clock;
   RecorderHeartbeat heartbeat;
   const std::string name = fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
@@ -83,21 +76,10 @@ int record(const Options& options) {
 }  // namespace roadfix
 
 int main(int argc, char** argv) {
-  CLI::App app{"Records everything on the bus: LCM logs, split, with a sidecar that says what is in them", "recorder"};
-  roadfix::Options options;
-  app.add_option("--config", options.vehicle, "the vehicle's folder; recorder.yaml in it may be absent")
-      ->check(CLI::ExistingDirectory);
-  app.add_option("--bus", options.bus, "LCM URL")->capture_default_str();
-  app.add_option("--folder", options.folder, "where to record to, instead of recorder.yaml's");
-  app.add_option("--realtime", options.realtime, "scheduling priority (SCHED_FIFO)")->check(CLI::Range(1, 99));
-  app.add_flag("--print-config", options.print_config, "print the effective configuration and end");
-  try {
-    app.parse(argc, argv);
-    return roadfix::record(options);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : roadfix::kUserError;
-  } catch (const std::exception& e) {
-    std::cerr << "recorder: " << e.what() << "\n";
-    return roadfix::kUserError;
-  }
+  roadfix::CommandLine arguments(
+      "Records everything on the bus: LCM logs, split, with a sidecar that says what is in them",
+      roadfix::CommandLine::Config::kOptional);
+  std::string folder;
+  arguments.option("--folder", folder, "Where to record to, instead of recorder.yaml's");
+  return arguments.run(argc, argv, [&] { return roadfix::record(arguments, folder); });
 }

@@ -1,9 +1,9 @@
 #include "drivers/device/run_driver.h"
 
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <roadfix/raw_t.hpp>
 
+#include "bus/command_line.h"
 #include "bus/log_reader.h"
 #include "bus/log_writer.h"
 #include "bus/network_bus.h"
@@ -18,16 +18,6 @@ namespace {
 
 constexpr auto kPatience = std::chrono::milliseconds(50);
 
-struct Arguments {
-  std::string config;
-  std::string bus = kDefaultBusUrl;
-  std::string device;
-  std::string log_in;
-  std::string log_out;
-  int realtime = 0;
-  bool print_config = false;
-};
-
 class LogOutputs : public SensorOutputs {
  public:
   explicit LogOutputs(LogWriter& log) : log_(log) {}
@@ -41,7 +31,7 @@ class LogOutputs : public SensorOutputs {
   LogWriter& log_;
 };
 
-void run_live(const Arguments& arguments, const DriverSetup& setup) {
+void run_live(const CommandLine& arguments, const DriverSetup& setup) {
   if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
   catch_stop_signals();
@@ -69,8 +59,8 @@ void run_live(const Arguments& arguments, const DriverSetup& setup) {
   driver.stop();
 }
 
-void run(const Arguments& arguments, const DriverProgram& program) {
-  const DriverSetup setup = program.read(arguments.config, arguments.device);
+void run(const CommandLine& arguments, const std::string& device, const DriverProgram& program) {
+  const DriverSetup setup = program.read(arguments.config, device);
   if (arguments.print_config) {
     std::cout << setup.config;
   } else if (arguments.log_in.empty()) {
@@ -109,30 +99,14 @@ DriverReplay replay_driver(const std::filesystem::path& in, const std::filesyste
 }
 
 int run_driver(int argc, char** argv, const DriverProgram& program) {
-  constexpr int kUserError = 2;
-  Arguments arguments;
-  CLI::App app{program.description, program.name};
-  app.footer(program.footer);
-  app.add_option("--config", arguments.config, "The vehicle's configuration folder")->required();
-  app.add_option("--bus", arguments.bus, "LCM URL")->capture_default_str();
-  app.add_option("--device", arguments.device, "Instead of the configured device");
-  app.add_option("--realtime", arguments.realtime, "Scheduling priority (SCHED_FIFO); others wait while this runs")
-      ->check(CLI::Range(1, 99));
-  CLI::Option* log_in = app.add_option("--log-in", arguments.log_in, "Take the raw bytes from this log, not a device");
-  CLI::Option* log_out = app.add_option("--log-out", arguments.log_out, "Write the messages to this log");
-  log_in->needs(log_out);
-  log_out->needs(log_in);
-  app.add_flag("--print-config", arguments.print_config, "Print the effective configuration and end");
-  try {
-    app.parse(argc, argv);
-    run(arguments, program);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : kUserError;
-  } catch (const std::exception& e) {
-    std::cerr << program.name << ": " << e.what() << "\n";
-    return kUserError;
-  }
-  return 0;
+  CommandLine arguments(program.description, CommandLine::Config::kRequired, program.footer);
+  std::string device;
+  arguments.option("--device", device, "Instead of the configured device");
+  arguments.add_logs("Take the raw bytes from this log, not a device", "Write the messages to this log");
+  return arguments.run(argc, argv, [&] {
+    run(arguments, device, program);
+    return 0;
+  });
 }
 
 }  // namespace roadfix

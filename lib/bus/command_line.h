@@ -1,0 +1,43 @@
+/// The command line that all of our processes on the bus share: the same options with the same words, and the same exit
+/// status: 0, 2 for what the user can mend (said on stderr as "NAME: ..."), or what the process itself returns.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace roadfix {
+
+class CommandLine {
+ public:
+  enum class Config { kRequired, kOptional };
+
+  CommandLine(const std::string& description, Config config, const std::string& footer = "");
+  ~CommandLine();
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+
+  /// For what only this process takes.
+  void option(const std::string& name, std::string& value, const std::string& help);
+  CLI::App& app() { return *app_; }
+  /// --log-in and --log-out, which go together.
+  void add_logs(const std::string& help_in, const std::string& help_out);
+
+  /// Reads the arguments and works. What `work` throws is told to the user.
+  int run(int argc, char** argv, const std::function<int()>& work);
+
+  std::string config;  ///< the vehicle's folder
+  std::string bus;
+  std::string log_in, log_out;
+  int realtime = 0;  ///< priority; 0: as everybody
+  bool print_config = false;
+
+ private:
+  std::unique_ptr<CLI::App> app_;
+};
+
+}  // namespace roadfix
