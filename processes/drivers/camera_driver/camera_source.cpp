@@ -1,6 +1,7 @@
 // V4L2 cameras, video files and picture files, through OpenCV.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <opencv2/videoio.hpp>
 #include <thread>
 
@@ -19,11 +20,17 @@ constexpr int kMaxMisses = 3;
 
 bool is_device(const std::string& name) { return name.starts_with("/dev/"); }
 
+std::string why_not(const std::string& name) {
+  if (!is_device(name)) return ": no video or picture file that can be opened";
+  return std::filesystem::exists(name) ? ": no camera that can be opened; does another program use it?"
+                                       : ": no camera is plugged in there (ls /dev/video*)";
+}
+
 cv::VideoCapture open_one(const std::string& name, const CameraDriverConfig& config) {
   cv::VideoCapture capture;
   capture.setExceptionMode(false);
   if (!capture.open(name, is_device(name) ? cv::CAP_V4L2 : cv::CAP_ANY)) {
-    throw SourceError(name + ": no camera, and no video or picture file, that can be opened");
+    throw SourceError(name + why_not(name));
   }
   if (!is_device(name)) return capture;
   const auto ask = [&](int property, double value) {

@@ -98,6 +98,8 @@ std::unique_ptr<ByteSource> open_tcp(const std::string& host, const std::string&
 std::unique_ptr<ByteSource> open_file(const std::string& path, double bytes_per_s);
 std::unique_ptr<ByteSource> open_pty();
 std::unique_ptr<ByteSource> open_can(const std::string& interface);
+/// Of a socket that is open and gives one struct can_frame or canfd_frame with each read; closes it at the end.
+std::unique_ptr<ByteSource> can_source(int descriptor, const std::string& interface);
 std::unique_ptr<ByteSource> open_candump(const std::string& path);
 
 }  // namespace roadfix

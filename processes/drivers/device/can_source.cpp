@@ -70,6 +70,7 @@ class CanSource : public DescriptorSource {
     message.msg_controllen = sizeof control;
     const ssize_t size = ::recvmsg(descriptor(), &message, MSG_DONTWAIT);
     if (size < 0) return errno == EAGAIN || errno == EINTR ? 0 : -1;
+    if (size == 0) return -1;
     if (size != static_cast<ssize_t>(CAN_MTU) && size != static_cast<ssize_t>(CANFD_MTU)) return 0;
     timeval stamp{};
     for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr; header = CMSG_NXTHDR(&message, header)) {
@@ -86,11 +87,17 @@ class CanSource : public DescriptorSource {
 
 }  // namespace
 
+std::unique_ptr<ByteSource> can_source(int descriptor, const std::string& interface) {
+  const int on = 1;
+  ::setsockopt(descriptor, SOL_SOCKET, SO_TIMESTAMP, &on, sizeof on);
+  return std::make_unique<CanSource>(descriptor, interface);
+}
+
 std::unique_ptr<ByteSource> open_can(const std::string& interface) {
   const std::string name = "can:" + interface;
   const int descriptor = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
   if (descriptor < 0) throw SourceError(name + ": this kernel has no SocketCAN (" + std::strerror(errno) + ")");
-  auto source = std::make_unique<CanSource>(descriptor, interface);
+  auto source = can_source(descriptor, interface);
   ifreq request{};
   interface.copy(request.ifr_name, IFNAMSIZ - 1);
   if (::ioctl(descriptor, SIOCGIFINDEX, &request) != 0) {
@@ -98,7 +105,6 @@ std::unique_ptr<ByteSource> open_can(const std::string& interface) {
   }
   const int on = 1;
   ::setsockopt(descriptor, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
-  ::setsockopt(descriptor, SOL_SOCKET, SO_TIMESTAMP, &on, sizeof on);
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = request.ifr_ifindex;

@@ -71,6 +71,11 @@ class SensorDriver {
   virtual void opened(int stream) = 0;
   virtual void take(int stream, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) = 0;
   [[nodiscard]] virtual std::vector<StreamCounters> counters() const = 0;
+  /// What the device itself says is the matter, in plain words; empty where all is well.
+  [[nodiscard]] virtual std::string trouble(int64_t now_utime) const {
+    (void)now_utime;
+    return {};
+  }
 };
 
 /// What a driver asks of the world beside reading: corrections from the network, sent to the device.

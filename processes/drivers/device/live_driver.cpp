@@ -76,8 +76,9 @@ void LiveDriver::publish_due() {
   }
 }
 
-std::string LiveDriver::trouble() const {
+std::string LiveDriver::trouble() {
   std::string text = session_.trouble(DeviceSession::Clock::now());
+  if (text.empty() && reader_.driver() != nullptr) text = reader_.driver()->trouble(clock_.now_utime());
   if (text.empty() && companion_) text = companion_->trouble();
   return text;
 }

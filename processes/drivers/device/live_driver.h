@@ -22,7 +22,7 @@ class LiveDriver {
   void stop();
 
   /// In plain words what is the matter with the device; empty where all is well.
-  [[nodiscard]] std::string trouble() const;
+  [[nodiscard]] std::string trouble();
   [[nodiscard]] std::string device_name() const { return session_.name(); }
   /// How often the device was opened.
   [[nodiscard]] int64_t openings() const { return session_.openings(); }

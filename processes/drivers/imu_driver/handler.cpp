@@ -13,6 +13,9 @@ namespace roadfix {
 
 namespace {
 
+/// For which a clipped sample is told: long enough for a heartbeat, and for eyes.
+constexpr int64_t kTold_us = 3'000'000;
+
 Eigen::Vector3d vector(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
 
 /// Body x forward, y right, z down to x forward, y left, z up.
@@ -141,6 +144,10 @@ void ImuDriver::take_imu(const SbgImuShort& imu, int64_t read_utime, SensorOutpu
     return;
   }
   ++used_;
+  if (!imu.in_range) {
+    ++clipped_;
+    clipped_utime_ = read_utime;
+  }
   imu_t message = to_message(ImuSample{*utime, flu(imu.gyro_radps), flu(imu.accel_mps2)});
   count(config_.channel, outputs.publish(config_.channel, message), *utime);
 }
@@ -235,6 +242,11 @@ void ImuDriver::take_nav(const SbgEkfNav& nav, int64_t read_utime, SensorOutputs
   if (!whole) pose.reason = "the Ellipse's own filter is not in full navigation";
   pose.reset_delta_q_wxyz[0] = 1.0;
   count(config_.solution_channel, outputs.publish(config_.solution_channel, pose), *utime);
+}
+
+std::string ImuDriver::trouble(int64_t now_utime) const {
+  if (clipped_ == 0 || now_utime - clipped_utime_ > kTold_us) return {};
+  return "the motion is beyond the IMU's range: " + std::to_string(clipped_) + " samples are clipped";
 }
 
 std::vector<StreamCounters> ImuDriver::counters() const {

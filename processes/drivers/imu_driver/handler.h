@@ -40,6 +40,8 @@ class ImuDriver : public SensorDriver {
   void opened(int stream) override;
   void take(int stream, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) override;
   [[nodiscard]] std::vector<StreamCounters> counters() const override;
+  /// Motion beyond the sensor's range: such samples are published (imu_t has no place to mark them), and told here.
+  [[nodiscard]] std::string trouble(int64_t now_utime) const override;
 
  private:
   void take_imu(const SbgImuShort& imu, int64_t read_utime, SensorOutputs& outputs);
@@ -60,6 +62,7 @@ class ImuDriver : public SensorDriver {
   std::optional<SbgEkfQuat> quat_;
   std::optional<EnuAnchor> anchor_;
   int64_t used_ = 0, refused_ = 0;
+  int64_t clipped_ = 0, clipped_utime_ = 0;
   std::map<std::string, StreamCounters> published_;
 };
 

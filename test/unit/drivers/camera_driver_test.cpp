@@ -1,5 +1,8 @@
 #include <catch2/catch.hpp>
+#include <iostream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 #include <roadfix/image_t.hpp>
 
 #include "drivers/camera_driver/handler.h"
@@ -38,6 +41,56 @@ TEST_CASE("pictures from files: JPEG out, the same again from the raw ones, one 
   CHECK(left.utime == right.utime);
   CHECK(left.width_px == 64);
   CHECK(left.format == image_t::FORMAT_JPEG);
+}
+
+TEST_CASE("a video file is played at its own rate, and ends the driver") {
+  const test::TemporaryFolder folder;
+  const std::string path = (folder / "drive.avi").string();
+  constexpr int kPictures = 8;
+  constexpr double kRate_hz = 50.0;
+  {
+    cv::VideoWriter video(path, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), kRate_hz, cv::Size(64, 48));
+    REQUIRE(video.isOpened());
+    for (int i = 0; i < kPictures; ++i) video.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar(20 * i, 100, 200 - 10 * i)));
+  }
+  CameraDriverConfig config;
+  config.devices = {path};
+  config.publish_raw = true;
+  Bench bench(camera_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return !bench.more; }));
+  REQUIRE(bench.count("CAMERA_LEFT") == kPictures);
+  const std::vector<Published> live = sensor_messages(bench);
+  CHECK(replayed(bench) == live);
+  const image_t first = decode<image_t>(live.front().bytes), last = decode<image_t>(live.back().bytes);
+  CHECK(first.width_px == 64);
+  CHECK(static_cast<double>(last.utime - first.utime) > 0.9e6 * (kPictures - 1) / kRate_hz);
+  const cv::Mat shown = cv::imdecode(last.data, cv::IMREAD_COLOR);
+  CHECK(cv::norm(cv::mean(shown) - cv::Scalar(20 * (kPictures - 1), 100, 200 - 10 * (kPictures - 1))) < 5.0);
+}
+
+TEST_CASE("a camera that is not plugged in, and a device that is none, are told in plain words") {
+  for (const auto& [device, words] :
+       {std::pair("/dev/video_roadfix_none", "no camera is plugged in there"),
+        std::pair("/dev/null", "no camera that can be opened; does another program use it?"),
+        std::pair("/nowhere/drive.avi", "no video or picture file that can be opened")}) {
+    CameraDriverConfig config;
+    config.devices = {device};
+    Bench bench(camera_driver_setup(config));
+    REQUIRE(bench.step_until([&] { return bench.driver().trouble().find(words) != std::string::npos; }));
+    CHECK(bench.driver().trouble().starts_with(device));
+    CHECK(bench.count("CAMERA_LEFT") == 0);
+  }
+}
+
+TEST_CASE("V4L2: a camera that is there gives pictures") {
+  if (!std::filesystem::exists("/dev/video0")) {
+    std::cout << "skipped: no /dev/video0\n";
+    return;
+  }
+  CameraDriverConfig config;
+  config.devices = {"/dev/video0"};
+  Bench bench(camera_driver_setup(config));
+  REQUIRE(bench.step_until([&] { return bench.count("CAMERA_LEFT") > 2; }));
 }
 
 TEST_CASE("pictures as bytes: PNM there and back, sizes of JPEG, and garbage") {

@@ -49,6 +49,21 @@ TEST_CASE("a sensor that fails its own test is refused and counted") {
   CHECK(driver.counters().back().refused == 1);
 }
 
+TEST_CASE("motion beyond the sensor's range is used, and told for three seconds") {
+  ImuDriver driver(config());
+  std::vector<RawRead> reads;
+  for (uint32_t i = 0; i < 10; ++i) {
+    const auto status = static_cast<uint16_t>(i == 4 ? 0x02FF : i == 6 ? 0x01FF : 0x03FF);  // accelerometer, gyroscope
+    reads.push_back({kStart + 5000 * i, test::sbg_imu_bytes(5000U * i, status)});
+  }
+  CHECK(driver.trouble(kStart).empty());
+  CHECK(test::run_driver_over(driver, {reads[0], reads[1]}).sent.size() == 2);
+  CHECK(driver.trouble(kStart + 10'000).empty());
+  CHECK(test::run_driver_over(driver, {reads.begin() + 2, reads.end()}).sent.size() == 8);
+  CHECK(driver.trouble(kStart + 1'000'000) == "the motion is beyond the IMU's range: 2 samples are clipped");
+  CHECK(driver.trouble(kStart + 4'000'000).empty());
+}
+
 TEST_CASE("GPS1_POS, GPS1_VEL and GPS1_HDT of one moment make one fix") {
   std::vector<RawRead> reads;
   for (uint32_t i = 0; i < 10; ++i) {

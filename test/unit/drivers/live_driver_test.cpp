@@ -1,5 +1,6 @@
 // Drivers on a bus, with devices that are pseudo-terminals, sockets and files: unplugged, replugged, and replayed.
 #include <arpa/inet.h>
+#include <linux/can.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -37,6 +38,16 @@ DeviceConfig quick(const std::string& device) {
   c.reopen_first = 0.01;
   c.reopen_max = 0.05;
   return c;
+}
+
+WheelDriverConfig one_wheel() {
+  WheelDriverConfig config;
+  config.device = quick("can:can0");
+  config.speeds.resize(1);
+  config.speeds[0].frame = "123";
+  config.speeds[0].length = 16;
+  config.speeds[0].factor = 0.01;
+  return config;
 }
 
 Bytes imu_frame(uint32_t t_us) {
@@ -160,16 +171,70 @@ TEST_CASE("candump lines from a file become wheel speeds, the file's end ends th
       file << "(1700000000.0" << (10 + i) << "000) can0 123#"
            << "E803" << (i == 7 ? "x" : "") << "\n";
   }
-  WheelDriverConfig config;
+  WheelDriverConfig config = one_wheel();
   config.device = quick("candump:" + (folder / "can.log").string());
-  config.speeds.resize(1);
-  config.speeds[0].frame = "123";
-  config.speeds[0].length = 16;
-  config.speeds[0].factor = 0.01;
   Bench bench(wheel_driver_setup(config));
   REQUIRE(bench.step_until([&] { return !bench.more; }));
   CHECK(bench.count("WHEELS") == 29);
   CHECK(replayed(bench) == sensor_messages(bench));
+}
+
+/// SocketCAN's datagrams without its kernel module: a socket of packets at one end of which frames are written.
+class CanWire {
+ public:
+  CanWire() { REQUIRE(::socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends_) == 0); }
+  ~CanWire() { unplug(); }
+  CanWire(const CanWire&) = delete;
+  CanWire& operator=(const CanWire&) = delete;
+  [[nodiscard]] int device() const { return ::dup(ends_[1]); }
+  template <class Frame>
+  void send(const Frame& frame) const {
+    REQUIRE(::send(ends_[0], &frame, sizeof frame, 0) == static_cast<ssize_t>(sizeof frame));
+  }
+  void unplug() {
+    for (int& end : ends_) {
+      if (end >= 0) ::close(end);
+      end = -1;
+    }
+  }
+
+ private:
+  int ends_[2] = {-1, -1};
+};
+
+TEST_CASE("SocketCAN: the kernel's frames become wheel speeds, and an interface that went away is told") {
+  CanWire wire;
+  int opened = 0;
+  DriverSetup setup = wheel_driver_setup(one_wheel());
+  setup.open = [&](const auto&) {
+    if (++opened > 1) throw SourceError("can:can0: Network is down");
+    return can_source(wire.device(), "can0");
+  };
+  Bench bench(setup);
+  REQUIRE(bench.step_until([&] { return bench.count("RAW_WHEELS") == 1; }));  // opened
+  can_frame classic{};
+  classic.can_id = 0x123;
+  classic.len = 2;
+  classic.data[0] = 0xE8, classic.data[1] = 0x03;  // 1000: 10 m/s
+  canfd_frame fast{};
+  fast.can_id = 0x123;
+  fast.len = 8;
+  fast.data[0] = 0xD0, fast.data[1] = 0x07;  // 20 m/s
+  can_frame other = classic, error = classic, extended = classic;
+  other.can_id = 0x124;
+  error.can_id |= CAN_ERR_FLAG;
+  extended.can_id |= CAN_EFF_FLAG;
+  for (const can_frame& frame : {other, error, extended, classic}) wire.send(frame);
+  REQUIRE(bench.step_until([&] { return bench.count("WHEELS") == 1; }));
+  wire.send(fast);
+  REQUIRE(bench.step_until([&] { return bench.count("WHEELS") == 2; }));
+  CHECK(bench.driver().trouble().empty());
+  const std::vector<Published> live = sensor_messages(bench);
+  CHECK(decode<wheels_t>(live[0].bytes).speed_mps[0] == Approx(10.0));
+  CHECK(decode<wheels_t>(live[1].bytes).speed_mps[0] == Approx(20.0));
+  CHECK(replayed(bench) == live);
+  wire.unplug();
+  REQUIRE(bench.step_until([&] { return bench.driver().trouble().find("Network is down; tried again") == 10; }));
 }
 
 TEST_CASE("SocketCAN: an interface that is not there is said") {
