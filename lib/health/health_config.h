@@ -10,7 +10,7 @@ namespace roadfix {
 /// A verdict within a second of the fault, recovery within two of its end: every window below is short for that.
 struct AlarmConfig {
   double raise_after = 0.1;  ///< s that a condition must hold before it counts
-  double clear_after = 0.5;  ///< s that it must be gone before it is forgotten
+  double clear_after = 0.3;  ///< s that it must be gone before it is forgotten; what happened once holds for 1 s itself
 };
 
 struct ChannelLimits {

@@ -15,8 +15,9 @@ constexpr std::size_t kMost = 1000;
 /// Degrees of freedom below which a mean says too little: at 10 a ratio of 5 is a chance of 1e-7.
 constexpr int kLeastDof = 10;
 constexpr int kLeastRefused = 3;
-/// Refused one and all for this long: told before they are most of the window.
-constexpr int64_t kInARow_us = 400'000;
+/// Refused one and all for this long: told before they are most of the window. A wheel that is stuck contradicts the
+/// estimate only half a second later, and the verdict is due within one.
+constexpr int64_t kInARow_us = 250'000;
 
 }  // namespace
 

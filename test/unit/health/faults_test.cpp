@@ -24,7 +24,7 @@ void check_told(SmallCar& car, const std::string& key, Verdict verdict) {
   Verdict worst = Verdict::kOk;
   car.drive(kMended, kMended + 0.2, [&](double) { worst = std::max(worst, car.health.verdict()); });
   CHECK(worst == verdict);
-  car.drive(kMended + 0.2, kMended + 2.0);
+  car.drive(kMended + 0.2, kMended + 1.8);
   CHECK(car.health.verdict() == Verdict::kOk);
 }
 
@@ -246,6 +246,20 @@ TEST_CASE("measurements refused one and all are told before they are most of the
     }
   };
   CHECK(single.told("refused.GNSS position in INS", 0.0, kMended) < 0.0);  // two in a row are none yet
+
+  // A fast source: a quarter of a second of refusals is told, a fifth is a pothole.
+  for (const double refused_s : {0.2, 0.4}) {
+    SmallCar fast;
+    fast.tick = [&](double t) {
+      if (std::lround(t * 100) % 5 == 0) {
+        fast.health.measurement("Wheel speed in INS", test::at(t), 1.0, 1, t < kFault || t > kFault + refused_s);
+      }
+    };
+    fast.drive(0.0, kFault);
+    const double told = fast.told("refused.Wheel speed in INS", kFault, kMended);
+    CHECK((told > 0.0) == (refused_s > 0.3));
+    CHECK(told < kFault + 0.5);
+  }
 }
 
 TEST_CASE("what is expected and never comes is named; unexpected absence is not") {
