@@ -124,7 +124,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
   if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for its gate
   move_height(s);
   const FuseStatus status = fuse_motion(s, view, report);
-  fuse_rates(s, view);
+  fuse_rates(s, view, !ins && status == FuseStatus::kAccepted);
   const PlanarMixture after = combine_planar(imm_);
   follow_local(before, after);
   if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for the tie

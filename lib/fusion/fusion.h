@@ -169,7 +169,7 @@ class Fusion {
   FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, FusionChannelReport& report);
   [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
-  void follow_ins_errors(const Odometry& ins, double dt);
+  void follow_ins_errors(const Odometry& ins, double dt, bool was_away);
   /// m2/s2, east and north, by which the INS says that its velocity is unsurer than what lasts of its error.
   [[nodiscard]] Eigen::Vector2d grown_velocity_variance(const Odometry& ins) const;
   [[nodiscard]] Eigen::Matrix3d motion_noise(const Memory& m, const ChannelSample& sample, const LevelView& view,
@@ -179,7 +179,7 @@ class Fusion {
   FuseStatus fuse_odometry(FusionChannel channel, const Planar& motion, double dt, const Eigen::Matrix3d& R,
                            bool with_yaw, FusionChannelReport& report);
   [[nodiscard]] Eigen::Matrix3d jitter(FusionChannel c) const;
-  void fuse_rates(const ChannelSample& sample, const LevelView& view);
+  void fuse_rates(const ChannelSample& sample, const LevelView& view, bool told_turn);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
                        FusionChannelReport& report);
   FuseStatus follow_ins(const PlanarEstimate& known, const LevelView& view, FusionChannelReport& report);

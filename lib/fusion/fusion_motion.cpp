@@ -56,13 +56,13 @@ Eigen::Vector2d Fusion::grown_velocity_variance(const Odometry& ins) const {
 }
 
 /// The errors of the INS velocity and of its gyro last while no fix corrects them: their variances grow as the INS
-/// says; where a fix did, or the INS came to stand, what was known of them is void.
-void Fusion::follow_ins_errors(const Odometry& ins, double dt) {
+/// says; where a fix did, the INS came to stand or was away, what was known of them is void.
+void Fusion::follow_ins_errors(const Odometry& ins, double dt, bool was_away) {
   Memory& m = memory(FusionChannel::kIns);
   const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
   const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
   const double drift_variance = ins_drift_std_ * ins_drift_std_;
-  const bool redone = ins_corrected_ || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
+  const bool redone = was_away || ins_corrected_ || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
   const Eigen::Vector2d grown = grown_velocity_variance(ins);
   const double drift_grown = std::max(0.0, drift_variance - m.drift_variance);
   distrust_ *= std::exp(-dt / kDistrustTime);
@@ -118,19 +118,19 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
       tie_.forget();
     }
   }
-  if (!m.last) return FuseStatus::kNotReady;
-  const double dt = seconds_between(m.last->t_us, t_us_);
-  if (dt <= 0.0) return FuseStatus::kNotReady;
-  if (dt > timeout(s.channel)) {
-    m.last.reset();
-    return FuseStatus::kNotReady;
-  }
   const bool ins = s.channel == FusionChannel::kIns;
+  const double dt = m.last ? seconds_between(m.last->t_us, t_us_) : 0.0;
+  if (dt > timeout(s.channel)) m.last.reset();
+  if (ins && !m.last) {
+    ins_corrected_ = false;
+    follow_ins_errors(s.odometry, 0.0, true);
+  }
+  if (!m.last || dt <= 0.0) return FuseStatus::kNotReady;
   if (ins) ins_corrected_ = corrected(m.view, view);
   const Planar motion = motion_of(s.channel, m.view, view);
   if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
 
-  if (ins) follow_ins_errors(s.odometry, dt);
+  if (ins) follow_ins_errors(s.odometry, dt, false);
   Eigen::Matrix3d R = motion_noise(m, s, view, motion, dt);
   m.yaw_rate_variance = R(2, 2) / dt;
   if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {

@@ -28,12 +28,13 @@ void Fusion::tell(const FusionInnovation<3>& innovation, const Eigen::Vector3d& 
 }
 
 /// Speed and yaw rate: of the INS, or while it is silent of who is there.
-void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view) {
+void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view, bool told_turn) {
   if (s.channel != FusionChannel::kIns && alive(FusionChannel::kIns)) return;
   if (s.channel == FusionChannel::kVo && !agreement_.agrees) return;
   std::array<double, kModes> told{};
   for (std::size_t i = 0; i < kModes; ++i) told[i] = imm_.modes[i].log_likelihood;
-  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
+  if (!told_turn)
+    update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
   if (s.channel == FusionChannel::kIns && memory(s.channel).last) {  // the motion has told the turn already
     for (std::size_t i = 0; i < kModes; ++i) imm_.modes[i].log_likelihood = told[i];
   }
