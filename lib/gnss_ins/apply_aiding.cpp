@@ -21,6 +21,10 @@ AidingRecord not_ready(AidingSource source, int64_t t_us) {
 Measurement<3> position_of(const InsCore& core, const Pending& p, const Eigen::Vector3d& lever) {
   Measurement<3> m = gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()), lever);
   m.alike = p.alike;
+  if (p.fix_type != FixType::kRtkFixed && core.back().active) {
+    m.displaced = 0;
+    m.residual -= core.displacement();
+  }
   return m;
 }
 
@@ -57,12 +61,20 @@ AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& 
   return not_ready(AidingSource::kGnssPosition, p.t_us);
 }
 
+bool AidingApplier::agrees_undisplaced(const InsCore& core, const Pending& p, const Gates& gates) const {
+  if (p.fix_type == FixType::kRtkFixed || !core.back().active) return false;
+  InsCore plain = core;
+  plain.end_return();
+  return apply(plain, p, gates).status == AidingStatus::kAccepted;
+}
+
 AidingRecord AidingApplier::apply_level(InsCore& core, const Pending& p, const Gates& gates) const {
   const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
   Measurement<2> level;
   level.residual = all.residual.head<2>();
   level.H = all.H.topRows<2>();
   level.R = all.R.topLeftCorner<2, 2>();
+  level.displaced = all.displaced;
   level.alike = p.alike;
   return core.fuse(AidingSource::kGnssPosition, p.t_us, level, gates.nis[2]);
 }
@@ -73,6 +85,7 @@ AidingRecord AidingApplier::apply_height(InsCore& core, const Pending& p, const 
   height.residual = all.residual.tail<1>();
   height.H = all.H.bottomRows<1>();
   height.R = all.R.bottomRightCorner<1, 1>();
+  if (all.displaced >= 0) height.displaced = 2;
   height.alike = p.alike;
   return core.fuse(AidingSource::kGnssPosition, p.t_us, height, gates.nis[1]);
 }

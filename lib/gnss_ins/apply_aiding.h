@@ -21,6 +21,8 @@ class AidingApplier {
 
   /// The measurement as it is, at core's epoch; `gate` widens (or narrows) the configured one.
   AidingRecord apply(InsCore& core, const Pending& p, const Gates& gates) const;
+  /// Is the receiver taken for displaced, and would the position pass if it were not?
+  bool agrees_undisplaced(const InsCore& core, const Pending& p, const Gates& gates) const;
   /// Only the level part of a position.
   AidingRecord apply_level(InsCore& core, const Pending& p, const Gates& gates) const;
   AidingRecord apply_height(InsCore& core, const Pending& p, const Gates& gates) const;

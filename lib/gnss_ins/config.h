@@ -65,7 +65,7 @@ struct AidingConfig {
   bool use_zero_velocity = true;
   bool use_mag = true;
   bool use_error_correlation = true;  ///< of successive GNSS positions
-  bool use_outage_doubt = true;       ///< of positions after an outage, until they have shown their noise
+  bool use_return_error = true;       ///< a receiver may come back from an outage displaced
 };
 
 /// The no-sideslip constraint's noise, one learner for each axis.
@@ -155,7 +155,7 @@ void visit(AidingConfig& c, Visitor& v) {
   v.boolean("use_zero_velocity", c.use_zero_velocity);
   v.boolean("use_mag", c.use_mag);
   v.boolean("use_error_correlation", c.use_error_correlation);
-  v.boolean("use_outage_doubt", c.use_outage_doubt);
+  v.boolean("use_return_error", c.use_return_error);
 }
 
 template <class Visitor>

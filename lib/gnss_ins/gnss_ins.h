@@ -87,6 +87,8 @@ class GnssIns {
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
   void use_position(const Pending& measured);
+  void show_anew(const Pending& p);
+  void begin_return(const Pending& p);
   void weigh_by_itself(const Pending& measured, NoiseScale& noise);
   /// While coasting: when position or zero velocity was last used.
   [[nodiscard]] std::optional<int64_t> coasting_since() const;

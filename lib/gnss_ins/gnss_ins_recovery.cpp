@@ -15,10 +15,11 @@ constexpr double kOutage = 3.0;          // s without a position, after which a 
 // Correlation time of the errors of fixes without a fixed carrier phase, until they have shown theirs: multipath and
 // code smoothing last seconds to a minute (Misra and Enge, Global Positioning System, 2006, ch. 5).
 constexpr double kCodeAlike = 5.0;  // s
-// Of such fixes after an outage: variances as if two of them had been off by three of their sigmas. Receivers come back
-// metres off and do not say so; chosen between the error that this leaves and what it costs where they are good.
-constexpr double kReturnFactor = 10.0;
-constexpr double kReturnCount = 2.0;
+// m, level: how far off a receiver may come back at least (twice that in height), and at most as far as the fix is off.
+constexpr double kReturnLeast = 3.0;
+constexpr double kReturnMost = 10.0;
+// A return error below this share of a fix's sigma no longer counts.
+constexpr double kReturnOver = 0.1;
 
 }  // namespace
 
@@ -53,15 +54,7 @@ void GnssIns::use_position(const Pending& measured) {
   PositionQuality& quality = position_quality_[static_cast<size_t>(p.fix_type)];
   const double since = position_at_us_ == 0 ? 2.0 * kOutage : seconds_between(position_at_us_, p.t_us);
   if (since > kOutage) {
-    // A fixed carrier phase was checked against its neighbours before it was called so.
-    const double alike = std::exp(-fix_interval_ / kCodeAlike);
-    const bool returned = position_at_us_ != 0 && config_.aiding.use_outage_doubt;
-    for (size_t type = 0; type < position_quality_.size(); ++type) {
-      const bool fixed = type == static_cast<size_t>(FixType::kRtkFixed);
-      PositionQuality& doubtful = position_quality_[type];
-      doubtful.correlation.assume(fixed ? 0.0 : alike);
-      if (returned) doubtful.noise.doubt(fixed ? 1.0 : kReturnFactor, fixed ? 0.0 : kReturnCount);
-    }
+    show_anew(p);
   } else if (since > 0.0) {
     fix_interval_ = since;
   }
@@ -72,6 +65,12 @@ void GnssIns::use_position(const Pending& measured) {
   if (config_.aiding.use_error_correlation) p.alike = quality.correlation.inflation();
 
   AidingRecord r = applier_.apply(*core_, p, gates_);
+  if (r.status == AidingStatus::kGated && applier_.agrees_undisplaced(*core_, p, gates_)) {
+    begin_return(p);  // it has jumped back
+    r = applier_.apply(*core_, p, gates_);
+  }
+  const double sigma = std::sqrt(p.cov(0, 0) + p.cov(1, 1));
+  if (core_->back().active && core_->back().size() < kReturnOver * sigma) core_->end_return();
   // A jump, or a receiver that is dragged away from what wheels or its own velocity say, tells nothing of the noise.
   const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
   const bool heading_holds = agrees_with(AidingSource::kGnssVelocity, p.t_us);
@@ -109,6 +108,29 @@ void GnssIns::use_position(const Pending& measured) {
     }
   }
   note(r, p.id);
+}
+
+/// After an outage what the receiver has shown tells little of it. A fixed carrier phase was checked against its
+/// neighbours before it was called so.
+void GnssIns::show_anew(const Pending& p) {
+  const bool returned = position_at_us_ != 0 && config_.aiding.use_return_error;
+  for (size_t type = 0; type < position_quality_.size(); ++type) {
+    PositionQuality& quality = position_quality_[type];
+    const bool alike = type != static_cast<size_t>(FixType::kRtkFixed) && !returned;
+    quality.correlation.assume(alike ? std::exp(-fix_interval_ / kCodeAlike) : 0.0);
+    if (returned) quality.noise.begin_anew();
+  }
+  if (returned && p.fix_type != FixType::kRtkFixed) begin_return(p);
+}
+
+/// The first fix tells how large the error may be: what the filter's own uncertainty does not explain of it.
+void GnssIns::begin_return(const Pending& p) {
+  core_->end_return();
+  const AidingRecord r = applier_.apply(*core_, p, no_use_);
+  double excess = 0.0;
+  for (size_t i = 0; i < 2; ++i) excess += 0.5 * (r.innovation[i] * r.innovation[i] - r.innovation_variance[i]);
+  const double sigma = std::clamp(std::sqrt(std::max(excess, 0.0)), kReturnLeast, kReturnMost);
+  core_->begin_return(Eigen::Vector3d(sigma, sigma, 2.0 * sigma));
 }
 
 /// The fix teaches the noise before it is used, (M.37). What the gate refuses teaches nothing.

@@ -17,6 +17,7 @@ InsCore::InsCore(const GnssInsConfig& config, const Geodetic& anchor) : config_(
 void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
   x_ = x;
   P_ = P;
+  back_.end();
   sums_ = TransitionSums();
   last_ = InertialStep();
   motion_ = BodyMotion();
@@ -63,7 +64,10 @@ double InsCore::longest_age() const {
 }
 
 void InsCore::flush() {
-  propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_, P_);
+  if (sums_.duration <= 0.0) return;
+  const Transition phi(sums_, earth_.rate(), config_);
+  propagate_covariance(P_, phi, sums_, P_);
+  if (back_.active) back_.move(phi, sums_.duration);
   sums_ = TransitionSums();
 }
 

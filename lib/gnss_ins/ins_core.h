@@ -37,9 +37,14 @@ class InsCore {
   template <int Rows>
   AidingRecord fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
     ErrorMatrix moved;
+    ReturnError back = back_;
     const bool moves = sums_.duration > 0.0;
-    if (moves) propagate_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_, moved);
-    Innovation<Rows> innovation(moves ? moved : P_, m);
+    if (moves) {
+      const Transition phi(sums_, earth_.rate(), config_);
+      propagate_covariance(P_, phi, sums_, moved);
+      if (back.active) back.move(phi, sums_.duration);
+    }
+    Innovation<Rows> innovation(moves ? moved : P_, back, m);
     AidingRecord record = record_of(source, t_us, m, innovation);
     record.status = !innovation.usable       ? AidingStatus::kBadInput
                     : innovation.nis <= gate ? AidingStatus::kAccepted
@@ -47,10 +52,11 @@ class InsCore {
     if (record.status != AidingStatus::kAccepted) return record;
     if (moves) {
       P_ = moved;
+      back_ = back;
       sums_ = TransitionSums();
     }
     if (m.alike > 1.0) innovation.weigh(m.residual, m.alike * m.R);
-    innovation.apply(x_, P_, considered_);
+    innovation.apply(x_, P_, back_, considered_);
     return record;
   }
 
@@ -61,6 +67,15 @@ class InsCore {
   [[nodiscard]] double heading_std() const { return std::sqrt(P_(kAtt + 2, kAtt + 2)); }
   /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.
   [[nodiscard]] double longest_age() const;
+  /// The receiver has come back from an outage: its fixes may be displaced by as much as sigma (m, enu), (M.37).
+  void begin_return(const Eigen::Vector3d& sigma) {
+    flush();
+    back_.begin(sigma);
+  }
+  void end_return() { back_.end(); }
+  [[nodiscard]] const ReturnError& back() const { return back_; }
+  /// m, enu, by which the receiver is believed to be displaced at the state's epoch.
+  [[nodiscard]] Eigen::Vector3d displacement() const { return back_.after(sums_.duration); }
   [[nodiscard]] const BodyMotion& motion() const { return motion_; }
   [[nodiscard]] const InertialStep& last_step() const { return last_; }
   [[nodiscard]] EarthModel& earth() { return earth_; }
@@ -72,6 +87,7 @@ class InsCore {
     x_.serialise(a);
     sums_.serialise(a);
     last_.serialise(a);
+    back_.serialise(a);
     a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size, ahead_);
   }
 
@@ -82,6 +98,8 @@ class InsCore {
     d.add(local(NavState(), x_));
     d.add(x_.q_enu_imu.coeffs());
     d.add(P_);
+    d.add(back_.value);
+    d.add(back_.cov);
     d.add(sums_.velocity_change);
     d.add(Eigen::Matrix<double, 4, 3>(sums_.sum.leftCols<3>()));
   }
@@ -95,6 +113,7 @@ class InsCore {
   ErrorMatrix P_ = ErrorMatrix::Identity();
   TransitionSums sums_;
   InertialStep last_;
+  ReturnError back_;
   BodyMotion motion_;
   StateRange considered_;
   bool ahead_ = false;

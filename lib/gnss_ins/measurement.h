@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "gnss_ins/nav_state.h"
+#include "gnss_ins/return_error.h"
 
 namespace roadfix {
 
@@ -15,6 +15,7 @@ struct Measurement {
   Eigen::Matrix<double, Rows, 1> residual = Eigen::Matrix<double, Rows, 1>::Zero();
   Eigen::Matrix<double, Rows, kStates> H = Eigen::Matrix<double, Rows, kStates>::Zero();
   Eigen::Matrix<double, Rows, Rows> R = Eigen::Matrix<double, Rows, Rows>::Identity();
+  int displaced = -1;  ///< the first row has the return error of this axis in it, the next that of the next, (M.38)
   double alike = 1.0;  ///< the update takes R times this, because errors repeat; the gate does not, (M.36)
 };
 
@@ -58,7 +59,7 @@ class Innovation {
   using Small = Eigen::Matrix<double, Rows, Rows>;
   using Residual = Eigen::Matrix<double, Rows, 1>;
 
-  Innovation(const ErrorMatrix& P, const Measurement<Rows>& m) {
+  Innovation(const ErrorMatrix& P, const ReturnError& back, const Measurement<Rows>& m) {
     // Most of H is zero.
     std::array<int, kStates> used{};
     int count = 0;
@@ -78,6 +79,7 @@ class Innovation {
       const int k = used[static_cast<size_t>(i)];
       explained_ += m.H.col(k).lazyProduct(PHt_.row(k));
     }
+    if (back.active) displace(back, m);
     weigh(m.residual, m.R);
   }
 
@@ -103,7 +105,7 @@ class Innovation {
   /// Kalman update in the symmetric form P -= Y Y', Y = P H' L^-T with S = L L' (M.20): every element and its mirror
   /// are the same sum of the same products. `considered` states keep value and variance, but their uncertainty counts
   /// (Schmidt 1966).
-  void apply(NavState& x, ErrorMatrix& P, const StateRange& considered) const {
+  void apply(NavState& x, ErrorMatrix& P, ReturnError& back, const StateRange& considered) const {
     Eigen::Matrix<double, kStates, Rows> Y;
     for (int i = 0; i < Rows; ++i) {
       ErrorVector column = PHt_.col(i);
@@ -121,6 +123,7 @@ class Innovation {
           before.block(considered.first, considered.first, considered.size, considered.size);
     }
     x = retract(x, dx);
+    if (back.active) apply(back, Y);
   }
 
   Residual variance = Residual::Zero();
@@ -129,6 +132,32 @@ class Innovation {
   bool usable = false;  ///< S positive definite and everything finite
 
  private:
+  using Back = Eigen::Matrix<double, ReturnError::kSize, Rows>;
+
+  // What the return error has in the measurement and in its correlations.
+  void displace(const ReturnError& back, const Measurement<Rows>& m) {
+    back_PHt_ = back.cross.transpose().lazyProduct(m.H.transpose());
+    if (m.displaced < 0) return;
+    const auto cross = back.cross.template middleCols<Rows>(m.displaced);
+    const Small shared = m.H.lazyProduct(cross);
+    explained_ += shared + shared.transpose() + back.cov.template block<Rows, Rows>(m.displaced, m.displaced);
+    PHt_ += cross;
+    back_PHt_ += back.cov.template middleCols<Rows>(m.displaced);
+  }
+
+  void apply(ReturnError& back, const Eigen::Matrix<double, kStates, Rows>& Y) const {
+    Back Z;
+    for (int i = 0; i < Rows; ++i) {
+      typename Back::ColXpr column = Z.col(i);
+      column = back_PHt_.col(i);
+      for (int k = 0; k < i; ++k) column -= L_(i, k) * Z.col(k);
+      column /= L_(i, i);
+    }
+    back.value += Z.lazyProduct(whitened_);
+    back.cross -= Y.lazyProduct(Z.transpose());
+    back.cov -= Z.lazyProduct(Z.transpose());
+  }
+
   static void subtract(ErrorMatrix& P, const Eigen::Matrix<double, kStates, Rows>& Y) {
     for (int j = 0; j < kStates; ++j) P.col(j) -= Y.lazyProduct(Y.row(j).transpose());
   }
@@ -150,6 +179,7 @@ class Innovation {
   }
 
   Eigen::Matrix<double, kStates, Rows> PHt_;
+  Back back_PHt_;            // of the return error
   Small explained_;          // H P H'
   Small L_ = Small::Zero();  // lower triangle
   Residual whitened_ = Residual::Zero();

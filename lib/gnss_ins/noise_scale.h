@@ -18,12 +18,8 @@ class NoiseScale {
     return factor_ > 1.0 + std::max(chance, kExcess) ? factor_ : 1.0;
   }
 
-  /// What was seen before an outage tells little about the receiver after it: at least `factor` for the time being, as
-  /// if `count` measurements had shown it.
-  void doubt(double factor, double count) {
-    factor_ = std::max(factor_, factor);
-    seen_ = count;
-  }
+  /// What was seen before an outage tells little about the receiver after it.
+  void begin_anew() { seen_ = 0.0; }
   /// So few measurements are known that each must speak for itself as well.
   [[nodiscard]] bool doubted() const { return seen_ < kMemory; }
 
