@@ -13,9 +13,9 @@ namespace {
 
 constexpr int64_t kLongestStepUs = 250'000;  // without a picture the state follows at least this often
 constexpr double kMaxOffset_s = 0.3;         // of the camera's clock, that is waited for
-constexpr double kMaxGap_s = 0.5;            // of imu samples
 constexpr size_t kMaxWaiting = 1024;         // pictures, wheel samples
 constexpr double kMemory_s = 6.0;            // of imu samples before a start
+constexpr double kKept_s = 1.0;              // while running: a restart's pose is half a second old
 constexpr double kLineRest = 0.1;            // of the jitter that is left on the line
 constexpr double kShareMemory = 0.9;
 constexpr double kTurnSlack_s = 0.02;  // a picture may be this much newer than the samples
@@ -63,9 +63,9 @@ bool Msckf::advance(const ImuSample& imu) {
   if (dt > 0.0 && dt <= kMaxGap_s) standing_.add(imu, dt);
   imu_.push_back(imu);
   follow(imu.t_us - lag_us_);
-  while (imu_.size() > 2 &&
-         imu_[1].t_us <= (phase_ == MsckfPhase::kRunning ? state_.imu.t_us : imu.t_us - micros(kMemory_s)))
-    imu_.pop_front();
+  const int64_t needed_us = phase_ == MsckfPhase::kRunning ? std::min(state_.imu.t_us, imu.t_us - micros(kKept_s))
+                                                           : imu.t_us - micros(kMemory_s);
+  while (imu_.size() > 2 && imu_[1].t_us <= needed_us) imu_.pop_front();
   return true;
 }
 

@@ -24,7 +24,15 @@
 namespace roadfix {
 
 enum class MsckfPhase { kStarting, kRunning, kLost };
-enum class MsckfScale { kUnknown, kInertial, kWheels };
+enum class MsckfScale { kUnknown, kInertial, kWheels, kIns };
+
+/// A pose to begin again at.
+struct MsckfRestart {
+  int64_t t_us = 0;  ///< of the pose; the imu's samples tell the way since
+  SE3 T_local_vehicle;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, vehicle axes
+  Matrix6d cov_pose = Matrix6d::Zero();                ///< as Odometry::cov_pose
+};
 
 struct MsckfOutput {
   Odometry odometry;
@@ -33,6 +41,7 @@ struct MsckfOutput {
   bool standing = false;
   std::string reason;  ///< plain words; empty when all is well
   int reset_counter = 0;
+  SE3 reset_delta;  ///< of the newest reset: q turns the old attitude on the right, p is added to the old position
   int num_landmarks = 0;
   int num_tracks = 0;       ///< in the newest picture
   double used_share = 1.0;  ///< of the points tried lately, those that fitted
@@ -48,6 +57,9 @@ class Msckf {
   void add_speed(int64_t t_us, double speed, double sigma);
   /// The horizon has passed this sample. False where it is refused: not newer, or not finite.
   bool advance(const ImuSample& imu);
+  /// Forgets what it knows and begins again there, (M.41). False, and nothing has changed, where a number is not finite
+  /// or no sample as new as the pose has been handed in.
+  bool restart(const MsckfRestart& restart);
 
   /// Carried to `ahead`, newest samples that advance() has not seen yet, oldest first.
   [[nodiscard]] MsckfOutput output(std::span<const ImuSample> ahead = {}) const;
@@ -64,6 +76,8 @@ class Msckf {
   void load(std::span<const uint8_t> bytes);
 
  private:
+  static constexpr double kMaxGap_s = 0.5;  ///< of imu samples
+
   struct KnownSpeed {
     int64_t t_us = 0;
     double speed = 0.0, sigma = 0.0;
@@ -114,6 +128,8 @@ class Msckf {
                 double tilt_std);
   void judge(int64_t t_us);
   void lose(const std::string& reason);
+  /// Of the newest imu sample; where it was lost while it is not running.
+  [[nodiscard]] SE3 newest_pose() const;
 
   template <class Archive>
   void serialise(Archive& a);
@@ -138,7 +154,8 @@ class Msckf {
   std::string reason_;
   bool stands_ = false;
   int reset_counter_ = 0;
-  SE3 last_pose_;  ///< where a restart goes on
+  SE3 reset_delta_;
+  SE3 last_pose_;  ///< where a start goes on
   int64_t next_clone_ = 1;
   int64_t clone_us_ = 0;  ///< of the newest clone
   int64_t next_wheels_us_ = 0, next_sideslip_us_ = 0, next_planar_us_ = 0, next_zero_us_ = 0;

@@ -105,9 +105,9 @@ void Msckf::serialise(Archive& a) {
     a(s.t_us, s.length_us, s.at.up, s.at.v, s.speed_std, s.side_std, s.tilt_std, s.scale);
   });
   int64_t stamp_us = stamps_.last_us();
-  a(phase_, scale_, reason_, stands_, reset_counter_, last_pose_.q.coeffs(), last_pose_.p, stamp_us, next_clone_,
-    clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_, used_us_, doubtful_us_, used_share_,
-    num_seen_);
+  a(phase_, scale_, reason_, stands_, reset_counter_, reset_delta_.q.coeffs(), reset_delta_.p, last_pose_.q.coeffs(),
+    last_pose_.p, stamp_us, next_clone_, clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_,
+    used_us_, doubtful_us_, used_share_, num_seen_);
   stamps_.set_last(stamp_us);
 }
 

@@ -117,6 +117,7 @@ void Msckf::lose(const std::string& reason) {
   reason_ = reason;
   stands_ = false;
   ++reset_counter_;
+  reset_delta_ = {};
 }
 
 MsckfOutput Msckf::output(std::span<const ImuSample> ahead) const {
@@ -126,6 +127,7 @@ MsckfOutput Msckf::output(std::span<const ImuSample> ahead) const {
   out.standing = stands_;
   out.reason = reason_;
   out.reset_counter = reset_counter_;
+  out.reset_delta = reset_delta_;
   out.num_landmarks = static_cast<int>(state_.landmarks.size());
   out.num_tracks = num_seen_;
   out.used_share = used_share_;

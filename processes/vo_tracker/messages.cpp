@@ -49,6 +49,8 @@ const char* name_of(FrontEndKind kind) {
   return "klt";
 }
 
+}  // namespace
+
 void set_reset(int counter, const SE3& delta, pose_t& m) {
   m.reset_counter = counter;
   for (int i = 0; i < 3; ++i) m.reset_delta_m[i] = delta.p(i);
@@ -57,8 +59,6 @@ void set_reset(int counter, const SE3& delta, pose_t& m) {
   m.reset_delta_q_wxyz[2] = delta.q.y();
   m.reset_delta_q_wxyz[3] = delta.q.z();
 }
-
-}  // namespace
 
 pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin) {
   pose_t m{};

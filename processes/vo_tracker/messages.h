@@ -17,6 +17,7 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
 vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end);
 vo_features_t vo_features(const TrackedFrame& frame);
 
+void set_reset(int counter, const SE3& delta, pose_t& message);
 Restart restart(const vo_restart_t& message);
 /// How fast the vehicle goes; nothing where the sample cannot tell.
 std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels);

@@ -5,6 +5,7 @@
 #include <roadfix/image_t.hpp>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
@@ -13,6 +14,7 @@
 #include "config/config.h"
 #include "geometry/frames.h"
 #include "vo_tracker/camera_rig.h"
+#include "vo_tracker/messages.h"
 #include "vo_tracker/picture.h"
 
 namespace roadfix {
@@ -44,6 +46,8 @@ int8_t scale_source(MsckfScale scale) {
       return vo_status_t::SCALE_FROM_IMU;
     case MsckfScale::kWheels:
       return vo_status_t::SCALE_FROM_WHEELS;
+    case MsckfScale::kIns:
+      return vo_status_t::SCALE_FROM_INS;
     case MsckfScale::kUnknown:
       break;
   }
@@ -98,8 +102,11 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   spec_.inputs.push_back({"WHEELS", "wheels_t", kWheelLateness_us, 0});
   ins_ = static_cast<int>(spec_.inputs.size());
   spec_.inputs.push_back({"POSE_INS", "pose_t", 0, kFeedback_us});
+  restart_ = static_cast<int>(spec_.inputs.size());
+  spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
+  spec_.state_layout = 2;
 }
 
 void MsckfStage::make_parts() {
@@ -131,6 +138,11 @@ void MsckfStage::apply(const Message& m) {
     const Odometry o = odometry(decode<pose_t>(m.bytes));
     if (o.validity != Validity::kInvalid)
       filter_->add_speed(m.utime + kFeedback_us, o.velocity.x(), std::sqrt(o.cov_velocity(0, 0)));
+  } else if (m.input == restart_) {
+    if (waiting_) track_waiting();
+    const Restart r = restart(decode<vo_restart_t>(m.bytes));
+    if (!filter_->restart({r.t_us, r.T_local_vehicle, r.velocity, r.cov_pose}))
+      note_ = "a restart at a pose that cannot be used was refused";
   }
 }
 
@@ -163,8 +175,7 @@ void MsckfStage::publish(int64_t now_utime, Outputs& outputs) {
     pose.scale = out.scale == MsckfScale::kUnknown ? pose_t::SCALE_UNKNOWN : pose_t::SCALE_METRIC;
     pose.state = pose_state(out);
     pose.reason = out.reason;
-    pose.reset_counter = out.reset_counter;
-    pose.reset_delta_q_wxyz[0] = 1.0;
+    set_reset(out.reset_counter, out.reset_delta, pose);
     outputs.publish(kPose, pose);
   }
   if (tracked_) publish_frame(out, outputs);
@@ -178,7 +189,8 @@ void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
                  : out.phase == MsckfPhase::kStarting ? vo_status_t::STATE_INITIALISING
                  : out.reason.empty()                 ? vo_status_t::STATE_GOOD
                                                       : vo_status_t::STATE_WEAK;
-  status.reason = out.reason;
+  status.reason = note_.empty() ? out.reason : note_;
+  note_.clear();
   status.front_end = "klt";
   status.scale_source = scale_source(out.scale);
   const double speed = out.odometry.velocity.norm();
@@ -216,6 +228,7 @@ std::vector<uint8_t> MsckfStage::save() const {
   writer.put(pose_slot_);
   writer.put(tracked_);
   writer.put(brightness_);
+  writer.put(note_);
   return writer.take();
 }
 
@@ -229,6 +242,7 @@ void MsckfStage::load(std::span<const uint8_t> state) {
   reader.get(pose_slot_);
   reader.get(tracked_);
   reader.get(brightness_);
+  reader.get(note_);
   reader.finish();
   ahead_.clear();
 }

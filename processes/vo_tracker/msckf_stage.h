@@ -44,7 +44,7 @@ class MsckfStage final : public Stage {
   std::vector<uint8_t> superpoint_weights_;
   StageSpec spec_;
   bool stereo_;
-  int wheels_ = 0, ins_ = 0;  ///< indices of these inputs
+  int wheels_ = 0, ins_ = 0, restart_ = 0;  ///< indices of these inputs
   std::optional<Msckf> filter_;
   std::optional<PictureTracks> pictures_;
   std::optional<Waiting> waiting_;
@@ -52,6 +52,7 @@ class MsckfStage final : public Stage {
   int64_t pose_slot_ = -1;
   bool tracked_ = false;  ///< a picture since the last publish
   double brightness_ = 0.0;
+  std::string note_;  ///< for the next status
 };
 
 }  // namespace roadfix

@@ -1,9 +1,11 @@
 /// Mode msckf as a stage: pictures of a small made-up street, an imu that moves along it.
 #include <catch2/catch.hpp>
 #include <roadfix/imu_t.hpp>
+#include <roadfix/ledger_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
 #include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
@@ -126,6 +128,64 @@ TEST_CASE("mode msckf: pictures may come late, and a snapshot goes on with the s
   CHECK(std::equal(tail.rbegin(), tail.rend(), full.rbegin()));
   auto stage = make_vo_tracker(calibration(), config());
   CHECK_THROWS(stage->load(std::vector<uint8_t>{1, 2, 3}));
+}
+
+/// The drive with a restart asked for at `asked_us` that arrives `delay_us` later.
+Collector run_restarted(int64_t asked_us, double place, int64_t delay_us) {
+  std::vector<Sent> all = drive(0);
+  vo_restart_t m{};
+  m.restart_position_m[0] = place;
+  m.restart_q_wxyz[0] = 1.0;
+  m.restart_velocity_mps[0] = speed_at(seconds(asked_us));
+  for (int i = 0; i < 6; ++i) m.restart_cov_pose_m2_rad2[i][i] = i < 3 ? 0.04 : 1e-4;
+  all.push_back(sent("VO_RESTART", asked_us, 0, m, delay_us));
+  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
+  return run(all);
+}
+
+TEST_CASE("mode msckf: a restart takes effect half a second after its time, whenever it comes, and counts") {
+  constexpr int64_t kAsked_us = 8'030'000;
+  constexpr double kPlace = 500.0;
+  const Collector out = run_restarted(kAsked_us, kPlace, 0);
+  const auto poses = out.all<pose_t>("POSE_VO");
+  const double gone = way_at(seconds(poses.back().utime)) - way_at(seconds(kAsked_us));
+  const pose_t* before = nullptr;
+  const pose_t* after = nullptr;
+  for (const pose_t& p : poses) {
+    if (p.reset_counter == 0) before = &p;
+    if (p.reset_counter != 0 && after == nullptr) after = &p;
+    if (p.reset_counter != 0) CHECK(p.validity == pose_t::VALIDITY_VALID);
+  }
+  REQUIRE(before != nullptr);
+  REQUIRE(after != nullptr);
+  CHECK(before->utime < after->utime);
+  CHECK(poses.back().reset_counter == 1);
+  // At the horizon, which is as late as pictures may be.
+  CHECK(after->utime == Approx(kAsked_us + 500'000 + 200'000).margin(40'000));
+  CHECK(poses.back().position_m[0] == Approx(kPlace + gone).margin(0.8));
+  CHECK(poses.back().cov_pose_m2_rad2[0][0] > 0.04);
+  CHECK(after->reset_delta_m[0] == Approx(after->position_m[0] - before->position_m[0]).margin(0.5));
+  CHECK(out.all<vo_status_t>("VO_STATUS").back().state == vo_status_t::STATE_GOOD);
+  // In time, the moment of its arrival does not show; later, it is not used and the ledger says so.
+  CHECK(run_restarted(kAsked_us, kPlace, 450'000).messages.at("POSE_VO") == out.messages.at("POSE_VO"));
+  const Collector late = run_restarted(kAsked_us, kPlace, 1'500'000);
+  CHECK(late.all<pose_t>("POSE_VO").back().reset_counter == 0);
+  const auto entered = [](const Collector& c) {
+    const auto ledgers = c.all<ledger_t>("LEDGER_VO_TRACKER");
+    return std::any_of(ledgers.back().entries.begin(), ledgers.back().entries.end(), [](const ledger_entry_t& e) {
+      return e.channel == "VO_RESTART" && e.kind == ledger_entry_t::KIND_UNUSED_FEEDBACK;
+    });
+  };
+  CHECK(entered(late));
+  CHECK_FALSE(entered(out));
+}
+
+TEST_CASE("mode msckf: a restart without numbers is refused, and the status says so") {
+  const Collector out = run_restarted(8'030'000, std::numeric_limits<double>::quiet_NaN(), 0);
+  int said = 0;
+  for (const vo_status_t& s : out.all<vo_status_t>("VO_STATUS")) said += s.reason.find("restart") != std::string::npos;
+  CHECK(said == 1);
+  CHECK(out.all<pose_t>("POSE_VO").back().reset_counter == 0);
 }
 
 }  // namespace
