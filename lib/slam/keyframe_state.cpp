@@ -172,7 +172,7 @@ void KeyframeTracker::members(Tracker& self, Archive& archive) {
   archive(out.state, out.reason, out.reset_counter, out.reset_delta, out.cov_closed, out.closed_reset_counter,
           out.closed_reset_delta);
   archive(self.T_map_camera_, self.t_us_, self.t_good_us_, self.t_able_us_, self.motion_, self.start_, self.pixels_,
-          self.landmarks_at_keyframe_);
+          self.landmarks_at_keyframe_, self.found_share_, self.after_keyframe_);
   archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
           self.scale_std_, self.restarted_, self.restart_);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "geometry/so3.h"
 #include "slam/reprojection.h"
@@ -16,6 +17,7 @@ namespace {
 constexpr double kStereoScaleStd = 0.01;
 
 constexpr double kStandingShare = 0.4;  ///< of a keyframe's landmarks, below which one is made at a standstill too
+constexpr double kFoundMemory = 0.8;    ///< how much of the share found after keyframes stays from one to the next
 
 /// How a camera pose's covariance becomes the vehicle's: the lever arm turns attitude error into position error.
 Matrix6d vehicle_covariance(const Matrix6d& cov_camera, const SE3& T_map_camera, const SE3& T_camera_vehicle) {
@@ -194,6 +196,7 @@ void KeyframeTracker::follow(const CameraFrame& frame) {
     return;
   }
   drop_wrong_tracks(features);
+  learn_found_share();
   if (needs_keyframe(features)) make_keyframe(frame, features);
 }
 
@@ -264,6 +267,14 @@ void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
   for (const int64_t track : wrong) pixels_.erase(track);
 }
 
+/// Descriptors find half of what there is already in the next picture, flow nearly all of it. What is lost then tells
+/// of the front end, only what is lost beyond it of the way.
+void KeyframeTracker::learn_found_share() {
+  if (!std::exchange(after_keyframe_, false) || landmarks_at_keyframe_ == 0) return;
+  const double found = std::min(1.0, static_cast<double>(out_.num_inliers) / landmarks_at_keyframe_);
+  found_share_ = kFoundMemory * found_share_ + (1.0 - kFoundMemory) * found;
+}
+
 bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const {
   const Eigen::Quaterniond q_now_keyframe = T_map_camera_.q.conjugate() * map_.last().T_map_camera.q;
   std::vector<double> flows;
@@ -283,7 +294,7 @@ bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const
   // Standing still tells nothing new, but what drives by covers tracks for good.
   const bool standing = *middle < config_.standing_flow_px;
   const double share = standing ? kStandingShare : config_.keyframe_min_share;
-  if (out_.num_inliers < share * landmarks_at_keyframe_) return true;
+  if (out_.num_inliers < share * found_share_ * landmarks_at_keyframe_) return true;
   return !standing && mean > config_.keyframe_flow_px;
 }
 
@@ -330,6 +341,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
   }
   map_.add_keyframe(keyframe, seen);
   landmarks_at_keyframe_ = count_landmarks(seen);
+  after_keyframe_ = true;
   begin_bundle();
   remember_place(frame, all);
 }

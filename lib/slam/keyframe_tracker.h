@@ -169,6 +169,7 @@ class KeyframeTracker {
   [[nodiscard]] std::vector<Feature> hints(const SE3& T_map_camera) const;
   [[nodiscard]] bool solve(const std::vector<Feature>& features, const SE3& T_predicted);
   void drop_wrong_tracks(const std::vector<Feature>& features);
+  void learn_found_share();
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
   void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features);
   void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);
@@ -194,6 +195,8 @@ class KeyframeTracker {
   std::optional<Start> start_;
   std::map<int64_t, Eigen::Vector2f> pixels_;  ///< of the live tracks in the last picture
   int landmarks_at_keyframe_ = 0;
+  double found_share_ = 1.0;     ///< of a keyframe's landmarks, in the picture after it: the front end's own, a mean
+  bool after_keyframe_ = false;  ///< the last frame was made a keyframe
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
   Matrix6d cov_closed_ = Matrix6d::Zero();    ///< the same of the pose with all loops closed
   LoopCloser loops_;

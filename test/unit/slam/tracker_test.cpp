@@ -1,5 +1,6 @@
 /// The whole tracker on a small made-up street.
 #include <catch2/catch.hpp>
+#include <cstdio>
 #include <cstring>
 
 #include "geometry/determinism.h"
@@ -129,6 +130,22 @@ TEST_CASE("after a loss a known place is taken where the vehicle can have come t
   CHECK(far.state == TrackState::kGood);
   CHECK(far.reset_counter == 1);
   CHECK((far.odometry.T_frame_vehicle.p - true_pose(24).p).norm() < 6.0);  // begun anew where it was lost
+}
+
+TEST_CASE("descriptors, half of which the next picture finds, make no more keyframes than the way asks for") {
+  const auto keyframes = [](FrontEndKind kind, double share) {
+    KeyframeTrackerConfig config;
+    config.front_end.kind = kind;
+    config.keyframe_min_share = share;
+    Run run(true, config);
+    for (const CameraFrame& frame : drive()) (void)run.tracker.process(frame);
+    return run.tracker.last().num_keyframes;
+  };
+  const double share = KeyframeTrackerConfig{}.keyframe_min_share;
+  const int64_t flow = keyframes(FrontEndKind::kKlt, share), orb = keyframes(FrontEndKind::kOrb, share);
+  std::printf("keyframes of %d frames: %ld with flow, %ld with ORB\n", kFrames, flow, orb);
+  CHECK(2 * std::max(flow, orb) < kFrames);  // 32 and 40 where a keyframe's own landmarks were the measure
+  CHECK(2 * keyframes(FrontEndKind::kOrb, 1.0) > kFrames);  // teeth: asked for all that it usually finds
 }
 
 TEST_CASE("a lost mono tracker begins again, also where most of its tracks leave the picture") {
