@@ -40,8 +40,14 @@ struct Drive {
   int valid = 0;
 };
 
-/// `focal_error`: relative, of the calibration that the tracker is given.
-Drive drive(uint64_t seed, bool stereo, double noise_px, double focal_error) {
+/// What the calibration that the tracker is given has wrong, and what the tracker thinks of it.
+struct Calibrated {
+  double focal_error = 0.0;         ///< relative
+  double right_shift_px = 0.0;      ///< of the right picture, sideways
+  double right_turn_std_deg = 0.0;  ///< the tracker's doubt
+};
+
+Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calibrated) {
   fix_eigen_blocking();
   StreetPlan plan;
   for (int i = -10; i < kFrames + 60; ++i) {
@@ -53,7 +59,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, double focal_error) {
   const World world = build_world(plan);
   CameraRig rig;
   rig.left = kLens;
-  rig.left.fx = rig.left.fy = kLens.fx * (1.0 + focal_error);
+  rig.left.fx = rig.left.fy = kLens.fx * (1.0 + calibrated.focal_error);
   rig.T_vehicle_left = kVehicleLeft;
   const SE3 T_left_right{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, 0.0}};
   if (stereo) {
@@ -64,11 +70,14 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, double focal_error) {
   tracks.wanted = 250;
   tracks.noise_px = noise_px;
   std::optional<TrackSimulator::RightCamera> right;
-  if (stereo) right = TrackSimulator::RightCamera{Camera(kLens), T_left_right};
+  CameraIntrinsics right_lens = kLens;
+  right_lens.cx += calibrated.right_shift_px;
+  if (stereo) right = TrackSimulator::RightCamera{Camera(right_lens), T_left_right};
   TrackSimulator simulator(world, tracks, Camera(kLens), right, seed);
 
   KeyframeTrackerConfig config;
-  config.focal_std = config.radial_std = config.right_turn_std_deg = 0.0;  // this lens is known exactly
+  config.focal_std = config.radial_std = 0.0;  // this lens is known exactly
+  config.right_turn_std_deg = calibrated.right_turn_std_deg;
   const auto seen = std::make_shared<test::SeenTracks>();
   InlineExecutor executor;
   KeyframeTracker tracker(config, rig, std::make_unique<test::SimulatedFrontEnd>(seen), executor,
@@ -107,11 +116,11 @@ struct Drives {
   double nees = 0.0, error = 0.0, sigma = 0.0;  ///< mean, and two medians
 };
 
-Drives drives(int count, bool stereo, double noise_px, double focal_error = 0.0) {
+Drives drives(int count, bool stereo, double noise_px, const Calibrated& calibrated = {}) {
   Drives all;
   std::vector<double> errors, sigmas;
   for (int seed = 1; seed <= count; ++seed) {
-    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px, focal_error);
+    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px, calibrated);
     CHECK(one.valid >= kFrames - 10);
     all.nees += one.nees / count;
     errors.push_back(one.error);
@@ -139,7 +148,19 @@ TEST_CASE("the covariance is that of the errors, whatever the noise", "[statisti
   }
   CHECK(mean > 0.7);
   CHECK(mean < 1.5);
-  CHECK(drives(3, true, 0.3, 0.005).nees > 3.0);  // teeth: an error that all tracks share
+  CHECK(drives(3, true, 0.3, {.focal_error = 0.005}).nees > 3.0);  // teeth: an error that all tracks share
+}
+
+TEST_CASE("a right picture that lies a third of a pixel off is found out by the motion") {
+  const double doubt = KeyframeTrackerConfig{}.right_turn_std_deg;
+  for (const double shift_px : {-0.3, 0.3}) {
+    const Drives exact = drives(3, true, 0.3), learnt = drives(3, true, 0.3, {0.0, shift_px, doubt}),
+                 believed = drives(3, true, 0.3, {0.0, shift_px, 0.0});
+    std::printf("right picture %+.1f px off: error %.3f m, %.3f m where the calibration is believed, %.3f m without\n",
+                shift_px, learnt.error, believed.error, exact.error);
+    CHECK(learnt.error < 0.25 * believed.error);  // teeth: the same drive, the calibration believed
+    CHECK(believed.error > 1.0);
+  }
 }
 
 }  // namespace
