@@ -70,7 +70,7 @@ std::vector<Pair> match(const cv::Mat& view, const cv::Mat& place) {
 
 }  // namespace
 
-std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view, size_t index) const {
+std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view, size_t index, bool with_scale) const {
   const Place& place = places_[index];
   const std::vector<Pair> pairs = match(view.descriptors, place.descriptors);
   if (static_cast<int>(pairs.size()) < kMinMatches) return std::nullopt;
@@ -84,7 +84,7 @@ std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view,
   auto solution = search_pose(points, config);
   if (!solution || solution->num_inliers < kMinInlierShare * static_cast<double>(pairs.size())) return std::nullopt;
   Recognition found{index, std::move(*solution), 1.0};
-  if (!config_.with_scale) return found;
+  if (!with_scale) return found;
   std::vector<double> ratios;  // lengths in the place's map over lengths in the camera's
   const SE3 T_camera_place = found.solution.T_map_camera.inverse();
   for (size_t i = 0; i < pairs.size(); ++i) {
@@ -100,18 +100,19 @@ std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view,
   return found;
 }
 
-std::optional<LoopCloser::Recognition> LoopCloser::recognise(const PlaceView& view, int64_t newest) const {
+std::optional<LoopCloser::Recognition> LoopCloser::recognise(const PlaceView& view, int64_t newest,
+                                                             bool with_scale) const {
   if (places_.empty() || view.descriptors.empty()) return std::nullopt;
   std::optional<Recognition> best;
   for (const auto& candidate : index_.look_up(view.descriptors, newest, kCandidates)) {
-    auto found = verify(view, static_cast<size_t>(candidate.place - places_.front().id));
+    auto found = verify(view, static_cast<size_t>(candidate.place - places_.front().id), with_scale);
     if (found && (!best || found->solution.num_inliers > best->solution.num_inliers)) best = std::move(found);
   }
   return best;
 }
 
 std::optional<SE3> LoopCloser::locate(const PlaceView& view) const {
-  const auto found = recognise(view, next_id_ - 1);
+  const auto found = recognise(view, next_id_ - 1, false);  // lost, it has no lengths of its own to compare
   if (!found) return std::nullopt;
   const Sim3 S_place_camera{found->solution.T_map_camera.q, found->solution.T_map_camera.p, 1.0};
   return (S_map_odom_.inverse() * places_[found->place].S_map_camera * S_place_camera).rigid();
@@ -141,7 +142,7 @@ void LoopCloser::forget_oldest() {
 }
 
 bool LoopCloser::visit(const PlaceView& view, bool continuous) {
-  const auto found = recognise(view, next_id_ - kRecent);
+  const auto found = recognise(view, next_id_ - kRecent, config_.with_scale);
   const int64_t id = next_id_;
   if (!places_.empty()) {
     PoseTie tie;

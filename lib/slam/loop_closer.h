@@ -65,8 +65,8 @@ class LoopCloser {
     double scale = 1.0;     ///< S_place_camera's
   };
 
-  [[nodiscard]] std::optional<Recognition> recognise(const PlaceView& view, int64_t newest) const;
-  [[nodiscard]] std::optional<Recognition> verify(const PlaceView& view, size_t place) const;
+  [[nodiscard]] std::optional<Recognition> recognise(const PlaceView& view, int64_t newest, bool with_scale) const;
+  [[nodiscard]] std::optional<Recognition> verify(const PlaceView& view, size_t place, bool with_scale) const;
   void remember(const PlaceView& view);
   void forget_oldest();
 

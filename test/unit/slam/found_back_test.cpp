@@ -1,0 +1,73 @@
+/// Mono loses sight and sees a known place again.
+#include <catch2/catch.hpp>
+#include <cstdio>
+
+#include "geometry/determinism.h"
+#include "slam/keyframe_tracker.h"
+#include "support/street.h"
+
+namespace roadfix {
+namespace {
+
+const CameraIntrinsics kLens{800, 300, 460.0, 460.0, 400.0, 130.0, Distortion::kNone, {}};
+constexpr int kLit = 24, kDark = 10;
+constexpr double kStep = 0.8;  // m a frame, straight ahead
+
+const cv::Mat& picture(int frame) {
+  static const std::vector<cv::Mat> kPictures = [] {
+    fix_eigen_blocking();
+    fix_opencv_threads();
+    const test::Street street(3);
+    std::vector<cv::Mat> all;
+    for (int i = 0; i < kLit; ++i) {
+      const SE3 T{Eigen::Quaterniond::Identity(), {0.0, 0.0, kStep * i}};
+      all.push_back(street.picture(T, kLens, 1.0, static_cast<unsigned>(i + 1)));
+    }
+    return all;
+  }();
+  return kPictures[static_cast<size_t>(frame)];
+}
+
+struct FoundBack {
+  TrackState state = TrackState::kLost;  ///< the first one with a pose
+  double error = 0.0;                    ///< m, of that pose
+  int resets = 0;
+};
+
+/// So many frames by wheels and pictures, a second of darkness, and the street again from frame `again` on.
+FoundBack after_darkness(int lit, int again) {
+  CameraRig rig;
+  rig.left = kLens;
+  InlineExecutor executor;
+  KeyframeTracker tracker({}, rig, make_front_end({}), executor);
+  int64_t t_us = 0;
+  const auto show = [&](const cv::Mat& left) {
+    t_us += 100'000;
+    tracker.speed({t_us, SpeedSource::kWheels, 10.0 * kStep, 0.02, 0.01});
+    return tracker.process({t_us, left, {}});
+  };
+  for (int i = 0; i < lit; ++i) (void)show(picture(i));
+  CHECK(tracker.last().state == TrackState::kGood);
+  for (int i = 0; i < kDark; ++i) (void)show(cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1));
+  CHECK(tracker.last().state == TrackState::kLost);
+  for (int i = again; i < kLit; ++i) {
+    const TrackedFrame out = show(picture(i));
+    if (out.odometry.validity == Validity::kInvalid) continue;
+    return {out.state, std::abs(out.odometry.T_frame_vehicle.p.z() - kStep * i), out.reset_counter};
+  }
+  return {};
+}
+
+TEST_CASE("mono finds a known place again where it can have come to it, and says so") {
+  const FoundBack near = after_darkness(14, 6), far = after_darkness(24, 6);  // 6 m and 14 m back
+  std::printf("mono after the dark: %.2f m off at a place nearby, %.2f m at one out of reach\n", near.error, far.error);
+  CHECK(near.state == TrackState::kRelocalised);
+  CHECK(near.resets == 1);
+  CHECK(near.error < 0.5);
+  CHECK(far.state == TrackState::kGood);  // begun anew where sight was lost
+  CHECK(far.resets == 1);
+  CHECK(far.error > 10.0);
+}
+
+}  // namespace
+}  // namespace roadfix
