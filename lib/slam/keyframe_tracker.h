@@ -4,9 +4,9 @@
 /// turns those whose points are known into a pose, slam/local_map.cpp makes a keyframe and new points where needed,
 /// slam/bundle.cpp adjusts the last keyframes. This class calls them in that order.
 ///
-/// Frames: local level as the vehicle was at the first pose; the map's coordinates. camera: the left eye.
-/// Without stereo lengths are in a unit of the tracker's own until something else gives their scale.
-/// A bundle adjustment begun at one frame is applied at the next, wherever it runs: same pictures, same bits.
+/// Frames: local has the vehicle's axes at the first pose, not the horizon's; the map's coordinates. camera: the left
+/// eye. Without stereo lengths are in a unit of the tracker's own until something else gives their scale. A bundle
+/// adjustment begun at one frame is applied at the next, wherever it runs: same pictures, same bits.
 #pragma once
 
 #include <memory>
