@@ -7,9 +7,9 @@ namespace {
 
 /// Two's complement, big-endian, 1 to 8 bytes.
 int64_t read_count(const uint8_t* data, int64_t bytes) {
-  int64_t value = static_cast<int8_t>(data[0]);
-  for (int64_t i = 1; i < bytes; ++i) value = static_cast<int64_t>(static_cast<uint64_t>(value) << 8) | data[i];
-  return value;
+  uint64_t value = (data[0] & 0x80U) != 0 ? ~uint64_t{0} : 0;
+  for (int64_t i = 0; i < bytes; ++i) value = (value << 8) | data[i];
+  return static_cast<int64_t>(value);
 }
 
 CheckResult skip_strings(std::size_t strings, std::span<const uint8_t>& rest) {

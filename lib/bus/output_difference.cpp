@@ -1,14 +1,22 @@
 #include "bus/output_difference.h"
 
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <sstream>
+#include <string_view>
 
 #include "bus/field_difference.h"
 
 namespace roadfix {
 
 namespace {
+
+std::string joined(std::initializer_list<std::string_view> parts) {
+  std::string all;
+  for (const std::string_view part : parts) all += part;
+  return all;
+}
 
 std::string seqs_in_words(int64_t first, int64_t last) {
   if (first == last) return "seq " + std::to_string(first);
@@ -21,7 +29,8 @@ std::string newly_applied(const StageSpec& spec, const provenance_t& now, const 
   for (std::size_t i = 0; i < now.last_seq.size() && i < spec.inputs.size(); ++i) {
     const int64_t old_seq = before && i < before->last_seq.size() ? before->last_seq[i] : -1;
     if (now.last_seq[i] == old_seq) continue;
-    text += (text.empty() ? "" : ", ") + spec.inputs[i].channel + " " + seqs_in_words(old_seq + 1, now.last_seq[i]);
+    text +=
+        joined({text.empty() ? "" : ", ", spec.inputs[i].channel, " ", seqs_in_words(old_seq + 1, now.last_seq[i])});
   }
   return text.empty() ? "nothing" : text;
 }
@@ -30,9 +39,9 @@ std::string cause(const StageSpec& spec, const provenance_t& car, const provenan
                   const std::optional<provenance_t>& before) {
   for (std::size_t i = 0; i < spec.inputs.size() && i < car.last_seq.size() && i < here.last_seq.size(); ++i) {
     if (car.last_seq[i] == here.last_seq[i] && car.num_applied[i] == here.num_applied[i]) continue;
-    return "the car had applied " + std::to_string(car.num_applied[i]) + " of " + spec.inputs[i].channel +
-           ", up to seq " + std::to_string(car.last_seq[i]) + "; here " + std::to_string(here.num_applied[i]) +
-           ", up to seq " + std::to_string(here.last_seq[i]) + ": a loss that the ledger does not tell";
+    return joined({"the car had applied ", std::to_string(car.num_applied[i]), " of ", spec.inputs[i].channel,
+                   ", up to seq ", std::to_string(car.last_seq[i]), "; here ", std::to_string(here.num_applied[i]),
+                   ", up to seq ", std::to_string(here.last_seq[i]), ": a loss that the ledger does not tell"});
   }
   if (car.ledger_entries != here.ledger_entries) {
     return "the car's ledger had " + std::to_string(car.ledger_entries) + " entries, the log's has " +
@@ -62,7 +71,7 @@ std::string first_line_difference(const std::string& a, const std::string& b) {
     more_b = static_cast<bool>(std::getline(lines_b, line_b));
     if (!more_a) line_a = "(no line)";
     if (!more_b) line_b = "(no line)";
-    if (line_a != line_b) return "'" + line_a + "' in the car, '" + line_b + "' here";
+    if (line_a != line_b) return joined({"'", line_a, "' in the car, '", line_b, "' here"});
   }
   return "";
 }
@@ -119,7 +128,7 @@ std::vector<std::string> config_differences(const config_t& car, const config_t&
   for (const auto& [name, version] : car_versions) {
     const auto found = here_versions.find(name);
     if (found != here_versions.end() && found->second != version) {
-      differences.push_back("library " + name + ": " + version + " in the car, " + found->second + " here");
+      differences.push_back(joined({"library ", name, ": ", version, " in the car, ", found->second, " here"}));
     }
   }
   if (car.cpu_features != here.cpu_features) {
