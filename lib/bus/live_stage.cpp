@@ -16,10 +16,6 @@ constexpr int64_t kLook_us = 100'000;
 constexpr int64_t kTrouble_us = 700'000;
 /// Without a tick for this long a stage says so; shorter gaps are ordinary.
 constexpr int64_t kNoClock_us = 1'000'000;
-/// So many clock samples in a row, all that much older than the clock: the stamps have gone back (a log played again, a
-/// corrected clock), and no newer one will come for a long time.
-constexpr int64_t kBehind = 5;
-constexpr int64_t kBehind_us = 10'000'000;
 }  // namespace
 
 LiveStage::LiveStage(std::function<std::unique_ptr<Stage>()> make, Bus& bus)
@@ -27,7 +23,8 @@ LiveStage::LiveStage(std::function<std::unique_ptr<Stage>()> make, Bus& bus)
       make_(std::move(make)),
       runner_(std::make_unique<StageRunner>(make_(), *this)),
       overload_(runner_->spec().overload),
-      lateness_(runner_->spec().inputs) {
+      lateness_(runner_->spec().inputs),
+      step_back_(runner_->spec().inputs.size()) {
   runner_->measure_time();
   started_us_ = clock_.now_utime();
   const std::vector<InputSpec>& inputs = runner_->spec().inputs;
@@ -58,12 +55,12 @@ void LiveStage::take(int input, std::span<const uint8_t> bytes) {
   }
   if (offer == Offer::kTick) {
     last_tick_us_ = clock_.now_utime();
-    behind_ = 0;
+    step_back_.forget();
     return;
   }
   const std::optional<int64_t> now = runner_->stream().clock_utime();
-  if (offer == Offer::kWaits || !header || !now || !is_clock(input) || header->utime > *now - kBehind_us) return;
-  if (++behind_ < kBehind) return;
+  if (offer == Offer::kWaits || !header || !now || !is_clock(input) || !runner_->can_decode(input, bytes)) return;
+  if (!step_back_.confirmed_by(input, *header, *now)) return;
   begin_again(header->utime);
   begin_horizon(header->utime);
   runner_->offer(input, bytes);
@@ -154,7 +151,7 @@ void LiveStage::begin_again(int64_t utime) {
   overload_ = OverloadChoice(runner_->spec().overload);
   lateness_ = LatenessWatch(runner_->spec().inputs);
   horizon_run_.reset();
-  behind_ = 0;
+  step_back_.forget();
   began_because_ = std::string("the stamps went ") + (ahead_us > 0 ? "ahead" : "back") + " by " +
                    std::to_string(std::abs(ahead_us) / 1'000'000) + " s: a new run";
 }

@@ -18,6 +18,7 @@
 #include "bus/run_clock.h"
 #include "bus/stage_memory.h"
 #include "bus/stage_runner.h"
+#include "bus/step_back.h"
 #include "bus/unsent_watch.h"
 #include "stream/lateness_watch.h"
 #include "stream/overload_choice.h"
@@ -67,9 +68,9 @@ class LiveStage : public MessageSink {
   std::unique_ptr<StageRunner> runner_;
   OverloadChoice overload_;
   LatenessWatch lateness_;
+  StepBack step_back_;
   std::optional<int64_t> horizon_run_;  ///< of our messages on HORIZON_<PROCESS>; none before the first clock sample
   int64_t horizon_seq_ = 0;
-  int64_t behind_ = 0;         ///< clock samples in a row that are far behind the clock
   std::string began_because_;  ///< of the run, where it is not the first
   std::set<int64_t> runs_;     ///< names given before
   std::filesystem::path memory_file_;

@@ -111,6 +111,10 @@ std::optional<int64_t> ChannelWatch::lag_us() const {
   return median_of(lags);
 }
 
+bool ChannelWatch::is_fresh(int64_t now_us) const {
+  return !window_.empty() && seconds(now_us - window_.back().now_us) <= std::max(kStale, 1.5 * silent_after());
+}
+
 /// The rate that the stamps show, once they have shown it long and regularly enough.
 void ChannelWatch::learn(int64_t now_us) {
   if (!judged_ || configured_ || window_.size() < kLeastMessages) return;
@@ -206,7 +210,7 @@ void ChannelWatch::judge_stamps(int64_t now_us, int64_t lag_us, std::vector<Cond
         condition("stamp_jump", Verdict::kDegraded, fmt::format("has stamps that jumped by {:+.1f} s", stamp_jump_s_)));
   }
   const std::optional<int64_t> lag = this->lag_us();
-  if (!lag || seconds(now_us - window_.back().now_us) > std::max(kStale, 1.5 * silent_after())) return;
+  if (!lag || !is_fresh(now_us)) return;
   const double latency = seconds(*lag - lag_us);
   if (latency > limits_.latency) {
     out.push_back(condition(

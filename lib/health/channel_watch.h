@@ -50,6 +50,8 @@ class ChannelWatch {
 
   /// Median of arrival minus stamp; absent before the first arrival and for channels that are not judged.
   [[nodiscard]] std::optional<int64_t> lag_us() const;
+  /// Whether something came lately, so that its stamps still say something.
+  [[nodiscard]] bool is_fresh(int64_t now_us) const;
 
   /// `start_us`: when what is expected should have appeared. `if_silent`: how bad it is when the channel falls silent.
   void judge(int64_t now_us, int64_t start_us, int64_t lag_us, Verdict if_silent, std::vector<Condition>& out);

@@ -94,9 +94,11 @@ std::string Health::judged_pose() const {
 int64_t Health::common_lag_us() const {
   std::vector<int64_t> lags;
   for (const auto& [name, watch] : channels_) {
-    if (const std::optional<int64_t> lag = watch.lag_us()) lags.push_back(*lag);
+    // What fell silent, or was forged for a while, has no say in what the time is now.
+    const std::optional<int64_t> lag = watch.is_fresh(decided_us_) ? watch.lag_us() : std::nullopt;
+    if (lag) lags.push_back(*lag);
   }
-  if (lags.empty()) return 0;
+  if (lags.empty()) return lag_us_;
   const auto middle = lags.begin() + static_cast<std::ptrdiff_t>(lags.size() / 2);
   std::nth_element(lags.begin(), middle, lags.end());
   return std::abs(*middle) > kPlayed_us ? *middle : 0;

@@ -134,6 +134,51 @@ TEST_CASE("a recorded log is a bus: its order of arrival gives the same outputs 
   REQUIRE(bytes[0] == bytes[1]);
 }
 
+TEST_CASE("stamps gone back are five in order of one publisher, not strays, forged or broken ones") {
+  constexpr int64_t kNow_us = 1'700'000'000'000'000, kHour_us = 3'600'000'000;
+  const auto confirmed = [](const std::vector<std::pair<int, Header>>& messages) {
+    StepBack back(3);
+    bool any = false;
+    for (const auto& [input, header] : messages) any = back.confirmed_by(input, header, kNow_us) || any;
+    return any;
+  };
+  const auto at = [&](int i) { return Header{kNow_us - kHour_us + 10'000 * i, 7, i}; };
+  REQUIRE(confirmed({{0, at(0)}, {0, at(1)}, {1, at(0)}, {0, at(2)}, {1, at(1)}, {0, at(3)}, {0, at(4)}}));
+  REQUIRE_FALSE(confirmed({{0, at(0)}, {0, at(1)}, {0, at(2)}, {1, at(3)}, {1, at(4)}, {2, at(5)}}));
+  REQUIRE_FALSE(confirmed({{0, at(5)}, {0, at(4)}, {0, at(3)}, {0, at(2)}, {0, at(1)}}));
+  std::vector<std::pair<int, Header>> broken, runs;
+  for (int i = 0; i < 9; ++i) {
+    broken.push_back({0, {std::numeric_limits<int64_t>::min() + i, 1, i}});
+    runs.push_back({0, {kNow_us - kHour_us + i, i, 0}});
+  }
+  REQUIRE_FALSE(confirmed(broken));
+  REQUIRE_FALSE(confirmed(runs));
+}
+
+TEST_CASE("broken and forged clock samples do not begin a new run, whatever times they claim") {
+  MemoryBus bus;
+  Ear ear(bus);
+  LiveStage live(make_filter, bus);
+  for (const DriveMessage& message : small_drive(2.0)) bus.publish(message.channel, message.bytes);
+  live.step(std::chrono::milliseconds(0));
+  imu_t forged{};
+  forged.run = 1;
+  for (const int64_t utime :
+       {std::numeric_limits<int64_t>::min(), int64_t{0}, int64_t{-1}, int64_t{1'000'000'000'000}}) {
+    for (int i = 0; i < 9; ++i) {
+      forged.utime = utime;
+      bus.publish("IMU", encode(forged));
+      live.step(std::chrono::milliseconds(0));
+    }
+  }
+  for (const DriveMessage& message : small_drive(4.0)) {
+    if (message.header.utime > kDriveStart_us + 2'000'000) bus.publish(message.channel, message.bytes);
+  }
+  live.step(std::chrono::milliseconds(0));
+  for (const std::vector<uint8_t>& bytes : ear.heard["POSE_INS"]) REQUIRE(read_header(bytes)->run == kDriveStart_us);
+  REQUIRE(read_header(ear.heard["POSE_INS"].back())->utime > kDriveStart_us + 3'900'000);
+}
+
 TEST_CASE("what the network did not take is told until some heartbeats came through") {
   UnsentWatch watch;
   watch.note(1'000'000, 0);

@@ -125,6 +125,21 @@ TEST_CASE("a drive that is played again years later is judged the same") {
   CHECK(car.told("channel.GNSS.silent", kFault, kMended) < kFault + 1.0);
 }
 
+TEST_CASE("channels that were forged for a moment do not set the time of the others") {
+  SmallCar car;
+  car.drive(0.0, kFault);
+  for (int i = 0; i < 40; ++i) {  // more than the car has
+    car.health.arrived("FORGED_" + std::to_string(i),
+                       {test::at(kFault), test::at(kFault) - 3'600'000'000, 1, 1, 100, {}});
+  }
+  car.drive(kFault, kFault + 1.0);
+  CHECK(std::abs(car.health.report().lag_s) > 3000.0);  // teeth: for a moment it does
+  car.drive(kFault + 1.0, kFault + 3.0);
+  INFO(car.reasons());
+  CHECK(car.health.report().lag_s == 0.0);
+  CHECK(car.health.verdict() == Verdict::kOk);
+}
+
 TEST_CASE("a frozen sensor repeats itself; a sensor that differs does not") {
   SmallCar car;
   car.arrival = [](const std::string& channel, double t, Arrival& a) {
