@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace roadfix {
 
@@ -18,6 +20,8 @@ constexpr int kLeastRefused = 3;
 /// Refused one and all for this long: told before they are most of the window. A wheel that is stuck contradicts the
 /// estimate only half a second later, and the verdict is due within one.
 constexpr int64_t kInARow_us = 250'000;
+/// After the newest refusal a fast source is well again.
+constexpr int64_t kStillRefused_us = 500'000;
 
 }  // namespace
 
@@ -67,6 +71,22 @@ bool NisWatch::refused_in_a_row(int64_t now_us) const {
   return count >= kLeastRefused && attempts_.back().now_us - since_us >= kInARow_us;
 }
 
+/// Whether refusals are still going on: the newest is no older than a few attempts would be. What came before a source
+/// fell silent, or was accepted again, is over.
+bool NisWatch::is_still_refused(int64_t now_us) const {
+  std::vector<int64_t> intervals_us;
+  std::optional<int64_t> refused_us;
+  const std::vector<Attempt> recent = window(now_us);  // newest first
+  for (std::size_t i = 0; i < recent.size(); ++i) {
+    if (i > 0) intervals_us.push_back(recent[i - 1].now_us - recent[i].now_us);
+    if (!recent[i].accepted && !refused_us) refused_us = recent[i].now_us;
+  }
+  if (!refused_us || intervals_us.empty()) return refused_us.has_value();
+  const auto middle = intervals_us.begin() + static_cast<std::ptrdiff_t>(intervals_us.size() / 2);
+  std::nth_element(intervals_us.begin(), middle, intervals_us.end());
+  return now_us - *refused_us <= std::max(kStillRefused_us, 5 * *middle / 2);
+}
+
 void NisWatch::judge(int64_t now_us, std::vector<Condition>& out) const {
   const NisReport r = report(now_us);
   int dof = 0;
@@ -77,7 +97,7 @@ void NisWatch::judge(int64_t now_us, std::vector<Condition>& out) const {
                                source_, r.ratio)});
   }
   const bool most = r.refused >= kLeastRefused && r.refused > limits_.refused_share * (r.used + r.refused);
-  if (most || refused_in_a_row(now_us)) {
+  if ((most || refused_in_a_row(now_us)) && is_still_refused(now_us)) {
     out.push_back({"refused." + source_, Verdict::kDegraded, kRankConsistency,
                    fmt::format("{} is refused: {} of the last {} contradict the estimate", source_, r.refused,
                                r.used + r.refused)});

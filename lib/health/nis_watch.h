@@ -36,6 +36,7 @@ class NisWatch {
     bool accepted = false;
   };
   [[nodiscard]] bool refused_in_a_row(int64_t now_us) const;
+  [[nodiscard]] bool is_still_refused(int64_t now_us) const;
   [[nodiscard]] std::vector<Attempt> window(int64_t now_us) const;
 
   std::string source_;

@@ -196,3 +196,22 @@ TEST_CASE("the mean of honest innovations is one, and the window forgets") {
   CHECK(watch.report(test::at(6.0)).ratio == Approx(4.0));
   CHECK(watch.report(test::at(30.0)).used == 0);
 }
+
+TEST_CASE("refusals are over once a source is used again, or has fallen silent; those that go on are not") {
+  // 10 Hz, refused for 3 s; then accepted, silent, or refused every second time.
+  const auto refused_until = [](const std::function<std::optional<bool>(int)>& later) {
+    NisWatch watch("POSE_VO in FUSION", ConsistencyLimits{});
+    for (int i = 0; i < 30; ++i) watch.seen(test::at(0.1 * i), 1.0, 3, false);
+    double last = 0.0;
+    for (int i = 30; i < 60; ++i) {
+      if (const std::optional<bool> accepted = later(i)) watch.seen(test::at(0.1 * i), 1.0, 3, *accepted);
+      std::vector<Condition> conditions;
+      watch.judge(test::at(0.1 * i + 0.01), conditions);
+      if (!conditions.empty()) last = 0.1 * i;
+    }
+    return last;
+  };
+  CHECK(refused_until([](int) { return true; }) < 3.5);
+  CHECK(refused_until([](int) { return std::nullopt; }) < 3.5);
+  CHECK(refused_until([](int i) { return i % 3 == 0; }) > 5.7);
+}

@@ -210,6 +210,47 @@ TEST_CASE("a process that beats fast is missed soon, a slow one later; a restart
   }
 }
 
+TEST_CASE("what a heartbeat says of its process: state, processor, memory, queue, lost datagrams") {
+  const ProcessLimits limits;
+  const auto told = [&](const std::function<void(HeartbeatFacts&)>& change) {
+    ProcessWatch watch("imm_fusion", limits, true);
+    HeartbeatFacts beat;
+    beat.run = 1;
+    beat.state = ProcessState::kRunning;
+    beat.cpu_share = 0.9 * limits.cpu_share;
+    beat.rss_bytes = 100 << 20;
+    beat.queue_age_s = 0.9 * limits.queue_age;
+    beat.kernel_drops = 5;  // before the monitor listened
+    watch.heartbeat(test::at(0.0), beat);
+    change(beat);
+    watch.heartbeat(test::at(1.0), beat);
+    std::vector<Condition> conditions;
+    watch.judge(test::at(1.1), 0, conditions);
+    std::string all;
+    for (const Condition& c : conditions) all += c.key + ": " + c.text + "\n";
+    return all;
+  };
+  CHECK(told([](HeartbeatFacts&) {}).empty());
+  CHECK(told([](HeartbeatFacts& b) { b.cpu_share = 0.97; }) ==
+        "process.imm_fusion.cpu: imm_fusion takes 97 % of a processor core\n");
+  CHECK(told([](HeartbeatFacts& b) { b.rss_bytes = int64_t{5} << 30; }) ==
+        "process.imm_fusion.memory: imm_fusion holds 5120 MiB\n");
+  CHECK(told([](HeartbeatFacts& b) {
+          b.queue_age_s = 0.7;
+          b.queue_channel = "POSE_VO";
+        }) == "process.imm_fusion.behind: imm_fusion is behind: POSE_VO waits 0.7 s for it\n");
+  CHECK(told([](HeartbeatFacts& b) { b.kernel_drops = 12; }) ==
+        "process.imm_fusion.kernel_drops: imm_fusion lost 7 datagrams: the kernel had no room for them\n");
+  CHECK(told([](HeartbeatFacts& b) {
+          b.state = ProcessState::kNoClock;
+          b.reason = "no newer sample on POSE_INS";
+        }) == "process.imm_fusion.no_clock: imm_fusion stands still: no newer sample on POSE_INS\n");
+  CHECK(told([](HeartbeatFacts& b) {
+          b.state = ProcessState::kDegraded;
+          b.reason = "the network did not take 7 messages";
+        }) == "process.imm_fusion.degraded: imm_fusion says: the network did not take 7 messages\n");
+}
+
 TEST_CASE("what spoke only once, as a forger does, is not missed for good; what is expected is") {
   for (const bool expected : {false, true}) {
     ProcessWatch watch("vo_tracker", ProcessLimits{}, expected);
