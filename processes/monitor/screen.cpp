@@ -112,6 +112,11 @@ void put_estimate(Page& page, const HealthReport& report) {
   const std::string since = duration(static_cast<double>(report.now_us - report.since_us) * 1e-6);
   for (const PoseReport& pose : report.poses) {
     if (pose.name != report.judged_pose) continue;
+    if (pose.validity == Validity::kInvalid) {
+      page.line(fmt::format(" {} is invalid{}; this verdict for {}", pose.name,
+                            pose.reason.empty() ? "" : ": " + pose.reason, since));
+      return;
+    }
     page.line(fmt::format(" {} {}, sure to {:.2f} m and {:.1f} deg, {:.0f} km/h; this verdict for {}", pose.name,
                           to_words(pose.validity), pose.position_std, pose.yaw_std / kDegree, pose.speed * 3.6, since));
     return;

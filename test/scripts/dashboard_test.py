@@ -58,6 +58,15 @@ class DashboardTest(unittest.TestCase):
                 self.assertIn("How far off", self.text("#errors-title"))
                 self.assertLessEqual(self.browser.value("document.documentElement.scrollWidth"), width)
 
+    def test_a_pose_that_is_none_has_no_numbers(self):
+        self.open(1280, 0.5)
+        self.assertIn("Do not use", self.text("#verdict-text"))
+        self.assertIn("not known", self.text("#facts"))
+        self.assertNotIn("°", self.text("#facts"))
+        self.open(1280, 20)
+        self.assertNotIn("not known", self.text("#facts"))
+        self.assertRegex(self.text("#facts"), r"(?i)heading sure to\s+\d+\.\d\s+°")
+
     def test_something_is_drawn(self):
         self.open(1280, 45)
         colours = self.browser.wait("""(() => {

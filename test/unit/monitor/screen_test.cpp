@@ -69,6 +69,17 @@ TEST_CASE("verdict in big letters where there is room, in words where there is n
   CHECK_THAT(narrow, !Catch::Contains("█"));
 }
 
+TEST_CASE("a pose that is none has no numbers") {
+  HealthReport report = some_report(Verdict::kDoNotUse);
+  for (PoseReport& pose : report.poses) {
+    pose.validity = Validity::kInvalid;
+    pose.reason = "waits for a pose";
+  }
+  const std::string page = render_screen(report, {80, 40}, false);
+  CHECK_THAT(page, Catch::Contains("POSE_FUSED is invalid: waits for a pose; this verdict for"));
+  CHECK_THAT(page, !Catch::Contains("sure to"));
+}
+
 TEST_CASE("what comes from the bus cannot command the terminal") {
   HealthReport report = some_report(Verdict::kDegraded);
   report.reasons = {{"k", Verdict::kDegraded, 0, "evil \x1b[2J\x07 text\nsecond line"}};

@@ -20,8 +20,11 @@ export function showVerdict(frame, live) {
   const pose = frame.poses.find((p) => p.name === health.judged);
   const facts = [['Clock, UTC', clock(frame.t), '']];
   if (pose) {
-    facts.unshift(['Sure to', metres(pose.sigma), ''], ['Heading', `±${fixed(pose.yaw_sigma, 1)}`, '°'], ['Speed', (Math.abs(pose.speed) * 3.6).toFixed(0), 'km/h']);
-    if (pose.err != null) facts.unshift(['Really off by', metres(pose.err), '']);
+    const valid = VALIDITIES[pose.validity] !== 'invalid';
+    const heading = valid && pose.yaw_sigma < 180;
+    facts.unshift(['Place sure to', valid ? metres(pose.sigma) : 'not known', ''], ['Heading sure to', heading ? fixed(pose.yaw_sigma, 1) : 'not known', heading ? '°' : ''],
+      ['Speed', valid ? (Math.abs(pose.speed) * 3.6).toFixed(0) : 'not known', valid ? 'km/h' : '']);
+    if (valid && pose.err != null) facts.unshift(['Really off by', metres(pose.err), '']);
   }
   byId('facts').replaceChildren(...facts.map(([name, value, unit]) => {
     const box = element('div');
