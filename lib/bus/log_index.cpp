@@ -45,4 +45,23 @@ LogIndex index_logs(const std::vector<LogReader*>& readers,
   return index;
 }
 
+void drop_copies(LogIndex& index, const std::vector<LogReader*>& readers) {
+  const auto bytes = [&](const IndexedMessage& m) {
+    return readers[static_cast<std::size_t>(m.file)]->at(m.offset).data;
+  };
+  const auto name = [](const IndexedMessage& m) {
+    return std::tie(m.header.utime, m.channel, m.header.run, m.header.seq);
+  };
+  std::vector<IndexedMessage> kept;
+  kept.reserve(index.messages.size());
+  for (const IndexedMessage& message : index.messages) {
+    bool copy = false;
+    for (auto other = kept.rbegin(); other != kept.rend() && !copy && name(*other) == name(message); ++other) {
+      copy = other->file != message.file && std::ranges::equal(bytes(*other), bytes(message));
+    }
+    if (!copy) kept.push_back(message);
+  }
+  index.messages = std::move(kept);
+}
+
 }  // namespace roadfix

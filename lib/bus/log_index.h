@@ -32,4 +32,8 @@ struct LogIndex {
 LogIndex index_logs(const std::vector<LogReader*>& readers,
                     const std::function<bool(std::string_view channel)>& wanted);
 
+/// Two hosts, a recorder on each: most messages are in both recordings. Leaves one of the copies, which are alike to
+/// the byte and in different files.
+void drop_copies(LogIndex& index, const std::vector<LogReader*>& readers);
+
 }  // namespace roadfix

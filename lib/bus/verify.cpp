@@ -48,8 +48,9 @@ StageVerdict verify_stage(const NewStage& new_stage, const std::vector<LogReader
   const std::unique_ptr<Stage> stage = new_stage();
   const StageSpec spec = stage->spec();
   const std::set<std::string> channels = channels_of(spec);
-  const LogIndex index =
+  LogIndex index =
       index_logs(readers, [&](std::string_view channel) { return channels.contains(std::string(channel)); });
+  if (readers.size() > 1) drop_copies(index, readers);
   StageVerdict verdict;
   verdict.stage = spec.name;
   StageLog log = collect_stage_log(spec, readers, index);

@@ -38,7 +38,7 @@ int record(const CommandLine& arguments, const std::string& folder) {
   if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
   RunClock clock;
-  RecorderHeartbeat heartbeat;
+  RecorderHeartbeat heartbeat(config.name);
   const std::string name = fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
   RecordingThread recording(config, name);
   QueuePolicy unlimited;

@@ -11,6 +11,7 @@ namespace roadfix {
 enum class WhenFull { kStop, kDeleteOldest };
 
 struct RecorderConfig {
+  std::string name = "recorder";  ///< of the process; on two hosts with a recorder on each, one has another
   std::string folder = "recordings";
   std::string channels = ".*";  ///< POSIX extended regular expression over the whole name
   double split_size = 1024.0;   ///< MiB of one file
@@ -24,6 +25,7 @@ struct RecorderConfig {
 
 template <class Visitor>
 void visit(RecorderConfig& c, Visitor& v) {
+  v.text("name", c.name);
   v.text("folder", c.folder);
   v.text("channels", c.channels);
   v.number("split_size_mib", c.split_size, 1.0, 1048576.0);

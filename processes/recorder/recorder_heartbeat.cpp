@@ -3,10 +3,22 @@
 #include <fmt/format.h>
 
 #include <roadfix/heartbeat_t.hpp>
+#include <stdexcept>
 
 #include "bus/message.h"
+#include "bus/stage_runner.h"
 
 namespace roadfix {
+
+RecorderHeartbeat::RecorderHeartbeat(const std::string& name) : channel_(stage_channel("HEARTBEAT_", name)) {
+  constexpr std::size_t kMost = 40;
+  if (!name.empty() && name.size() <= kMost &&
+      name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos) {
+    return;
+  }
+  throw std::invalid_argument("recorder.yaml: name '" + name + "' is none: lower-case letters, digits and _, at most " +
+                              std::to_string(kMost));
+}
 
 void RecorderHeartbeat::publish(Bus& bus, RunClock& clock, const std::map<std::string, int64_t>& dropped,
                                 const std::optional<std::string>& stopped) {
@@ -31,7 +43,7 @@ void RecorderHeartbeat::publish(Bus& bus, RunClock& clock, const std::map<std::s
   }
   if (const std::string unsent = unsent_.trouble(heartbeat.utime); !unsent.empty()) say(unsent);
   heartbeat.state = reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;
-  bus.publish("HEARTBEAT_RECORDER", encode(heartbeat));
+  bus.publish(channel_, encode(heartbeat));
 }
 
 }  // namespace roadfix

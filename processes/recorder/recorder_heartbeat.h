@@ -15,11 +15,15 @@ namespace roadfix {
 
 class RecorderHeartbeat {
  public:
+  /// `name`: of the process; throws std::invalid_argument where it can be none.
+  explicit RecorderHeartbeat(const std::string& name = "recorder");
+
   /// `dropped`: messages per channel that did not fit into memory; `stopped`: why nothing is recorded.
   void publish(Bus& bus, RunClock& clock, const std::map<std::string, int64_t>& dropped,
                const std::optional<std::string>& stopped);
 
  private:
+  std::string channel_;
   ProcessLoad load_;
   UnsentWatch unsent_;
   int64_t seq_ = 0;

@@ -35,5 +35,16 @@ TEST_CASE("the recorder says all that it lost, did not write and could not send"
   CHECK_THAT(bad.state_reason, Catch::Contains("the network did not take 5 messages"));
 }
 
+TEST_CASE("a second recorder has a name and a channel of its own") {
+  test::OutageBus bus;
+  RunClock clock;
+  RecorderHeartbeat heartbeat("recorder_camera");
+  const auto h = test::last_of<heartbeat_t>(bus, "HEARTBEAT_RECORDER_CAMERA",
+                                            [&] { heartbeat.publish(bus, clock, {}, std::nullopt); });
+  CHECK(h.utime > 0);
+  for (const std::string name : {"", "Camera", "a b", "a.*"})
+    CHECK_THROWS_WITH(RecorderHeartbeat(name), Catch::Contains("'" + name + "'"));
+}
+
 }  // namespace
 }  // namespace roadfix
