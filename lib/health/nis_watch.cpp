@@ -20,6 +20,10 @@ constexpr int kLeastRefused = 3;
 /// Refused one and all for this long: told before they are most of the window. A wheel that is stuck contradicts the
 /// estimate only half a second later, and the verdict is due within one.
 constexpr int64_t kInARow_us = 250'000;
+/// Of NIS to degrees of freedom, up to which a measurement that is not used does not contradict the estimate: no gate
+/// is that narrow (95 % lie at 2.1 for six of them, at more for fewer). An estimator lets a source that lied fit for a
+/// while before it takes it again.
+constexpr double kWithinClaims = 2.0;
 /// After the newest refusal a fast source is well again.
 constexpr int64_t kStillRefused_us = 500'000;
 
@@ -27,6 +31,7 @@ constexpr int64_t kStillRefused_us = 500'000;
 
 void NisWatch::seen(int64_t now_us, double nis, int dof, bool accepted) {
   if (!std::isfinite(nis) || dof <= 0) return;
+  if (!accepted && nis <= kWithinClaims * dof) return;
   attempts_.push_back({now_us, nis, dof, accepted});
   while (attempts_.size() > kMost || now_us - attempts_.front().now_us > kOldest_us) attempts_.pop_front();
 }

@@ -292,13 +292,14 @@ TEST_CASE("a slow sensor is missed soon after it was due, unless it comes irregu
 TEST_CASE("measurements refused one and all are told before they are most of the window") {
   SmallCar car;
   car.tick = [&](double t) {
-    if (std::lround(t * 100) % 20 == 0) car.health.measurement("GNSS position in INS", test::at(t), 1.0, 3, !faulty(t));
+    if (std::lround(t * 100) % 20 == 0)
+      car.health.measurement("GNSS position in INS", test::at(t), faulty(t) ? 30.0 : 1.0, 3, !faulty(t));
   };
   check_told(car, "refused.GNSS position in INS", Verdict::kDegraded);
   SmallCar single;
   single.tick = [&](double t) {
     if (std::lround(t * 100) % 20 == 0) {
-      single.health.measurement("GNSS position in INS", test::at(t), 1.0, 3, t < kFault || t > kFault + 0.35);
+      single.health.measurement("GNSS position in INS", test::at(t), 30.0, 3, t < kFault || t > kFault + 0.35);
     }
   };
   CHECK(single.told("refused.GNSS position in INS", 0.0, kMended) < 0.0);  // two in a row are none yet
@@ -308,7 +309,7 @@ TEST_CASE("measurements refused one and all are told before they are most of the
     SmallCar fast;
     fast.tick = [&](double t) {
       if (std::lround(t * 100) % 5 == 0) {
-        fast.health.measurement("Wheel speed in INS", test::at(t), 1.0, 1, t < kFault || t > kFault + refused_s);
+        fast.health.measurement("Wheel speed in INS", test::at(t), 4.0, 1, t < kFault || t > kFault + refused_s);
       }
     };
     fast.drive(0.0, kFault);
