@@ -128,7 +128,17 @@ void ChannelWatch::learn(int64_t now_us) {
   });
   if (static_cast<double>(regular) < kRegularShare * static_cast<double>(intervals.size())) return;
   const double rate = 1e6 / period;
-  if (learn_anew_ || !expected_hz_ || rate > kFaster * *expected_hz_) expected_hz_ = rate;
+  if (!learn_anew_ && expected_hz_) {
+    // A burst is no new rate: what comes faster must have come so for as long as a rate takes to be known.
+    if (rate <= kFaster * *expected_hz_) {
+      faster_since_us_.reset();
+      return;
+    }
+    if (!faster_since_us_) faster_since_us_ = now_us;
+    if (seconds(now_us - *faster_since_us_) < limits_.learn) return;
+  }
+  faster_since_us_.reset();
+  expected_hz_ = rate;
   learn_anew_ = false;
 }
 

@@ -82,6 +82,7 @@ class ChannelWatch {
   bool configured_;
   std::optional<double> expected_hz_;
   bool learn_anew_ = true;
+  std::optional<int64_t> faster_since_us_;  ///< than expected
   std::deque<Seen> window_;
   int64_t first_us_ = 0;  ///< of the run
   int64_t run_ = 0, previous_run_ = 0, seq_ = 0;

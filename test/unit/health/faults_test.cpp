@@ -84,6 +84,23 @@ TEST_CASE("a sensor at half its rate") {
   CHECK(car.told("channel.IMU.slow", kFault, kMended) > kFault);
 }
 
+TEST_CASE("a burst is no new rate, a rate that stays is") {
+  for (const double burst_s : {2.0, 8.0}) {
+    ChannelWatch watch("VO_STATUS", ChannelLimits{}, std::nullopt);
+    bool slow = false;
+    int64_t seq = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const double t = 0.01 * i;
+      const bool burst = t >= 10.0 && t < 10.0 + burst_s;
+      if (burst || i % 10 == 0) watch.arrived({test::at(t), test::at(t), 1, seq++, 100, std::nullopt});
+      std::vector<Condition> conditions;
+      if (i % 10 == 0) watch.judge(test::at(t), 0, 0, Verdict::kDegraded, conditions);
+      slow = slow || (t > 25.0 && !conditions.empty());
+    }
+    CHECK(slow == (burst_s > 5.0));
+  }
+}
+
 TEST_CASE("stamps: late, ahead, jumping") {
   const auto shifted = [](double by_s) {
     SmallCar car;
