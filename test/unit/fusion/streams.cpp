@@ -75,7 +75,9 @@ std::vector<StreamEvent> ins_stream(const SimulatedDrive& drive, const InsNoise&
   for (int64_t t_us = step_us; t_us <= duration_us(drive) - step_us; t_us += step_us) {
     const double t_s = static_cast<double>(t_us) * 1e-6;
     for (AxisError* a : {&east, &north, &up}) a->walk(dt, n.velocity_walk, random);
+    const double yaw_before = yaw.e;
     yaw.walk(dt, n.yaw_walk, random);
+    const double gyro_error = (yaw.e - yaw_before) / dt;
     const bool outage = in_outage(n, t_s);
     if (t_s >= next_fix) {
       next_fix += n.fix_period;
@@ -95,6 +97,7 @@ std::vector<StreamEvent> ins_stream(const SimulatedDrive& drive, const InsNoise&
     o = truth;
     o.T_frame_vehicle.p += Eigen::Vector3d(east.e.x(), north.e.x(), up.e.x());
     o.T_frame_vehicle.q = quaternion({a.yaw + yaw.e, a.pitch + tilt.x(), a.roll + tilt.y()});
+    o.angular_rate.z() += gyro_error;  // what walks in the yaw came through the gyro
     const Eigen::Vector3d velocity_error(east.e.y(), north.e.y(), up.e.y());
     o.velocity = o.T_frame_vehicle.q.conjugate() * (truth.T_frame_vehicle.q * truth.velocity + velocity_error);
     const double c2 = n.claimed * n.claimed;
