@@ -14,6 +14,7 @@ using namespace fusion;
 namespace {
 
 constexpr double kUnknownPosition = 1e-3;  ///< m: a local frame begins where it begins
+constexpr double kShortestDoubt = 0.1;     ///< s
 constexpr double kLongestStep = 0.1;       ///< s, of the motion models; longer silences go in several
 
 bool usable(const Odometry& o) {
@@ -196,6 +197,7 @@ void Fusion::advance(int64_t t_us) {
     predict(imm_, config_.motion, dt);
   }
   let_return(comeback_, config_.comeback, total);
+  doubt_ *= std::exp(-total / std::max(kShortestDoubt, config_.refusal_timeout));
   t_us_ = t_us;
 }
 

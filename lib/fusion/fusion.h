@@ -231,10 +231,11 @@ class Fusion {
   std::optional<int64_t> restart_us_;
   std::optional<int64_t> refused_since_us_;
   std::optional<int64_t> last_fix_us_;
-  bool foreign_ = false;        ///< something in the pose did not come through the INS
-  bool ins_corrected_ = false;  ///< the INS used a fix since its last sample
-  int passes_needed_ = 0;       ///< fixes that must pass the gate before absolute poses are used again
-  double distrust_ = 0.0;       ///< m/s, of the INS velocity after a contradiction
+  bool foreign_ = false;           ///< something in the pose did not come through the INS
+  bool ins_corrected_ = false;     ///< the INS used a fix since its last sample
+  int passes_needed_ = 0;          ///< fixes that must pass the gate before absolute poses are used again
+  Planar doubt_ = Planar::Zero();  ///< by which vision contradicted when the fusion gave way, fading
+  double distrust_ = 0.0;          ///< m/s, of the INS velocity after a contradiction
   std::optional<int64_t> last_tie_us_;
   bool vo_scale_open_ = true;  ///< a non-metric vision's scale has no value yet
   ReturnState comeback_;

@@ -132,7 +132,7 @@ Fusion::Poses Fusion::carried(const Ahead& a) const {
 
   Planar pose = f.planar.pose + back.residual;
   pose.z() = wrap_angle(pose.z());
-  const Eigen::Matrix3d P = f.planar.P + back.residual * back.residual.transpose();
+  const Eigen::Matrix3d P = f.planar.P + back.residual * back.residual.transpose() + doubt_ * doubt_.transpose();
   Poses out;
   out.fused = full_pose(t_us, pose, P, height_ + a.rise + back.height,
                         height_variance_ + grown + back.height * back.height, attitude);

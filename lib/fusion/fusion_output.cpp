@@ -83,6 +83,7 @@ FusionReport Fusion::report() const {
   else if (!gnss_)
     weak("no GNSS");
   if (refused_since_us_) weak("GNSS/INS contradicts");
+  if (doubt_.head<2>().norm() > sigma) weak("gave way to GNSS/INS");
   if (alive(FusionChannel::kVo) && !agreement_.agrees)
     r.reason += std::string(r.reason.empty() ? "" : "; ") + "vision contradicts";
   if (!placed_) {
@@ -108,7 +109,7 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
   visit_odometry(self.attitude_, visit);
   FrameTie::visit_members(self.tie_, visit);
   visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.foreign_, self.ins_corrected_,
-        self.passes_needed_, self.distrust_, self.ins_drift_std_, self.last_tie_us_, self.vo_scale_open_);
+        self.passes_needed_, self.doubt_, self.distrust_, self.ins_drift_std_, self.last_tie_us_, self.vo_scale_open_);
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);

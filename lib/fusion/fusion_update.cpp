@@ -146,7 +146,8 @@ void Fusion::distrust_velocity(const Planar& difference) {
 }
 
 /// The absolute pose contradicts for so long that the fusion must be wrong: its uncertainty grows to the contradiction,
-/// and with it that of the odometries' poses beside it, which would be as wrong.
+/// and with it that of the odometries' poses beside it, which would be as wrong. Where vision still says otherwise, the
+/// published pose may be as wrong as that for a while.
 void Fusion::give_way(const Planar& difference) {
   const Eigen::Matrix3d all = difference * difference.transpose();
   constexpr int kTogether[] = {kPos, kVoClone, kWheelClone};
@@ -154,6 +155,7 @@ void Fusion::give_way(const Planar& difference) {
     for (const int i : kTogether)
       for (const int j : kTogether) mode.estimate.P.block<3, 3>(i, j) += all;
   now_ = combine(imm_);
+  if (vision_speaks()) doubt_ = difference;
 }
 
 FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& report) {

@@ -96,5 +96,81 @@ TEST_CASE("wheels that steady the INS's velocity ten times a second do not make 
   CHECK(stands.error < 0.8 * even.error);  // the speed that the fusion holds tells some of it again
 }
 
+/// An INS that is taken `off` m to the east at 50 s and stays there, beside a good vision.
+struct GivenWay {
+  std::optional<double> at_s;  ///< when the fusion gave way
+  double before = 0.0;         ///< m, from the INS to the fused place, a second before
+  double after = 0.0;          ///< m, largest from two seconds after it on
+  int refused = 0;             ///< pictures, from then on
+  double within_before = 0.0;  ///< share of the published poses within 3 sigma of where the car is, by 50 to 60 s
+  double within_after = 0.0;   ///< the same of the ten seconds after
+  bool coasting = true;        ///< the pose never called itself valid in those
+};
+GivenWay given_way(double off) {
+  Tunnel t;
+  t.ins.outages.clear();
+  t.ins.velocity_walk = 0.005;
+  t.with_wheels = false;
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events) {
+    const bool wrong = e.sample.channel == FusionChannel::kIns && seconds(t.drive, e.sample.odometry.t_us) > 50.0;
+    if (wrong) e.sample.odometry.T_frame_vehicle.p.x() += off;
+  }
+  Fusion fusion({});
+  GivenWay g;
+  double away = 0.0;
+  int before = 0, after = 0;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    if (s < 50.0) return;
+    if (e.sample.channel == FusionChannel::kVo) {
+      if (g.at_s && s > *g.at_s + 2.0 && f.channel(FusionChannel::kVo).status == FuseStatus::kGated) ++g.refused;
+      return;
+    }
+    const test::PlanarError p = test::planar_error(t.drive, f.fused());
+    const double within = p.distance() < 3.0 * std::sqrt(p.cov.topLeftCorner<2, 2>().trace()) ? 1.0 : 0.0;
+    if (!g.at_s && f.channel(FusionChannel::kIns).status == FuseStatus::kReset) {
+      g.at_s = s;
+      g.before = away;
+    }
+    away = (f.estimate().x.head<2>() - planar_pose(e.sample.odometry).head<2>()).norm();
+    if (!g.at_s) {
+      g.within_before += within;
+      ++before;
+    } else {
+      if (s > *g.at_s + 2.0) g.after = std::max(g.after, away);
+      if (s > *g.at_s + 10.0) return;
+      g.within_after += within;
+      g.coasting = g.coasting && f.report().validity == Validity::kCoasting;
+      ++after;
+    }
+  });
+  g.within_before /= std::max(1, before);
+  g.within_after /= std::max(1, after);
+  return g;
+}
+
+TEST_CASE("giving way takes the vision's own pose along: it neither pulls back nor is refused") {
+  const GivenWay g = given_way(15.0), none = given_way(0.0);
+  CHECK(!none.at_s);
+  REQUIRE(g.at_s);
+  INFO("at " << *g.at_s << " s: " << g.before << " m away before, " << g.after << " after, " << g.refused
+             << " refused");
+  CHECK(*g.at_s > 60.0);  // ten seconds of contradiction
+  CHECK(*g.at_s < 63.0);
+  CHECK(g.before > 10.0);
+  CHECK(g.after < 0.5);
+  CHECK(g.refused < 5);
+}
+
+TEST_CASE("who gave way to an INS that vision contradicts says so, and how wrong it may be") {
+  const GivenWay g = given_way(15.0);  // and here the vision was right
+  REQUIRE(g.at_s);
+  INFO(g.within_before << " before, " << g.within_after << " after");
+  CHECK(g.within_before > 0.99);
+  CHECK(g.within_after > 0.99);
+  CHECK(g.coasting);
+}
+
 }  // namespace
 }  // namespace roadfix
