@@ -5,6 +5,7 @@
 
 #include "draws.h"
 #include "geometry/euler.h"
+#include "geometry/so3.h"
 #include "tunnel.h"
 
 namespace roadfix {
@@ -170,6 +171,37 @@ TEST_CASE("who gave way to an INS that vision contradicts says so, and how wrong
   CHECK(g.within_before > 0.99);
   CHECK(g.within_after > 0.99);
   CHECK(g.coasting);
+}
+
+TEST_CASE("a gyro bias of the vision is learnt while GNSS is good") {
+  Tunnel t;
+  t.ins.yaw_walk = 1e-5;
+  t.ins.yaw_sigma = 5e-4;
+  t.vo.drift_std = 4e-3;  // rad/s; what was drawn is measured below
+  const std::vector<StreamEvent> events = t.events();
+  const auto learnt = [&](double expected) {
+    FusionConfig c;
+    c.vo_drift_std = expected;
+    Fusion fusion(c);
+    std::optional<double> first;  // yaw of the vision less the true one
+    double drift = 0.0, estimate = 0.0;
+    run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+      const Odometry& o = e.sample.odometry;
+      const double s = seconds(t.drive, o.t_us);
+      if (e.sample.channel != FusionChannel::kVo || s > 40.0) return;
+      const double off = planar_pose(o).z() - planar_pose(t.drive.truth_at(o.t_us)).z();
+      if (!first) first = off;
+      drift = wrap_angle(off - *first) / s;
+      estimate = f.estimate().x(kVoDrift);
+    });
+    return std::pair(drift, estimate);
+  };
+  const auto [drift, estimate] = learnt(1e-3);
+  INFO(drift << " rad/s, estimated " << estimate);
+  REQUIRE(std::abs(drift) > 3e-4);
+  CHECK(std::abs(estimate - drift) < 0.25 * std::abs(drift));
+  const auto closed = learnt(1e-9);
+  CHECK(std::abs(closed.second - closed.first) > 0.5 * std::abs(drift));  // teeth
 }
 
 }  // namespace
