@@ -127,7 +127,7 @@ void GnssIns::step(const ImuSample& imu) {
 }
 
 void GnssIns::align_again() {
-  if (phase_ == AlignmentPhase::kDone) abandoned_ = SE3{core_->state().q_enu_imu, core_->state().position};
+  if (usable()) abandoned_ = SE3{core()->state().q_enu_imu, core()->state().position};
   phase_ = AlignmentPhase::kWaiting;
   core_.reset();
   bank_.stop();

@@ -92,6 +92,9 @@ class GnssIns {
   void weigh_by_itself(const Pending& measured, NoiseScale& noise);
   /// While coasting: when position or zero velocity was last used.
   [[nodiscard]] std::optional<int64_t> coasting_since() const;
+  /// Aligned, or the heading is known as well as the mounting lets it be seen, (M.43).
+  [[nodiscard]] bool usable() const;
+  void count_new_alignment();
   [[nodiscard]] bool agrees_with(AidingSource source, int64_t t_us) const;
   void recover(const Pending& p);
   void refuse_height(const Pending& p);

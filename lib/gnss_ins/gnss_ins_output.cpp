@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kForwardSpan = 1.0;     // s that one transition of the forward covariance may cover
 constexpr double kCovarianceAge = 0.05;  // s that an output covariance may be used again
+constexpr char kHeadingRoughly[] = "the heading is known roughly";
 constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is not used";
 
 // Covariance of pose and velocity at the true time of the output, (M.40)-(M.42).
@@ -66,6 +67,7 @@ void GnssIns::rebase_forward() {
   if (forward_stale_ || !forward_ || forward_to_ < ring_.begin() ||
       behind > kForwardSpan + 1e-6 * static_cast<double>(lag_us_)) {
     forward_.emplace(base);
+    if (phase_ == AlignmentPhase::kHeading) forward_->replace_covariance(bank_.covariance());
     forward_->run_ahead();
     forward_to_ = ring_.begin();
     forward_stale_ = false;
@@ -109,12 +111,13 @@ GnssInsOutput GnssIns::output() {
   out.odometry.cov_velocity = cov_velocity_;
 
   const double horizontal = std::sqrt(cov_pose_(0, 0) + cov_pose_(1, 1));
-  if (phase_ != AlignmentPhase::kDone) {
+  if (!usable()) {
     out.reason = std::string("waits for ") + waiting_for(phase_, last_step_us_ != 0, fix_.has_value());
   } else if (!(horizontal < config_.alignment.invalid_sigma_m)) {
     out.reason = "position too uncertain";
   } else {
     const bool coasting = coasting_since().has_value();
+    if (phase_ == AlignmentPhase::kHeading) out.reason = kHeadingRoughly;
     out.odometry.validity = coasting || unseen_ ? Validity::kCoasting : Validity::kValid;
     if (coasting) out.reason = "coasting without GNSS";
     if (unseen_) out.reason = "from the place where it was parked, without GNSS yet";
@@ -127,8 +130,7 @@ GnssInsOutput GnssIns::output() {
 std::optional<int64_t> GnssIns::coasting_since() const {
   const auto used_at = [&](AidingSource source) { return used_at_us_[static_cast<size_t>(source)]; };
   const int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
-  const bool coasting =
-      phase_ == AlignmentPhase::kDone && seconds_between(anchored, last_step_us_) > config_.alignment.coasting_s;
+  const bool coasting = usable() && seconds_between(anchored, last_step_us_) > config_.alignment.coasting_s;
   return coasting ? std::optional(anchored) : std::nullopt;
 }
 

@@ -152,6 +152,20 @@ std::optional<InsMemory> GnssIns::memory() const {
   return m;
 }
 
+bool GnssIns::usable() const {
+  if (phase_ != AlignmentPhase::kHeading) return phase_ == AlignmentPhase::kDone;
+  return bank_.heading_std() <
+         std::hypot(config_.alignment.confirm_std_deg * kDegree, config_.vehicle.mounting_std.z());
+}
+
+void GnssIns::count_new_alignment() {
+  const NavState& x = core()->state();
+  ++reset_counter_;
+  reset_delta_.p = x.position - abandoned_->p;
+  reset_delta_.q = abandoned_->q.conjugate() * x.q_enu_imu;
+  abandoned_.reset();
+}
+
 void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done) {
   bank_.predict(imu, dt, noise);
   const auto leader = [&]() -> const NavState& { return bank_.leader().state(); };
@@ -166,19 +180,14 @@ void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& nois
     note(bank_.aid([&](InsCore& core) { return applier_.standing_velocity(core, no_gates_); }), 0);
     note(bank_.aid([&](InsCore& core) { return applier_.standing_rate(core, monitor_.block(), no_gates_); }), 0);
   }
+  if (abandoned_ && usable()) count_new_alignment();
   if (!block_done || !bank_.confirmed()) return;
   core_.emplace(bank_.leader());
   core_->consider({});
-  if (abandoned_) {
-    const NavState& x = core_->state();
-    ++reset_counter_;
-    reset_delta_.p = x.position - abandoned_->p;
-    reset_delta_.q = abandoned_->q.conjugate() * x.q_enu_imu;
-    abandoned_.reset();
-  }
   bank_.stop();
   phase_ = AlignmentPhase::kDone;
   forward_stale_ = true;
+  if (abandoned_) count_new_alignment();
 }
 
 }  // namespace roadfix

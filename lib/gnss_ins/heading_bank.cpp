@@ -21,6 +21,7 @@ constexpr double kReverseBelief = -12.0;  // log of 6e-6
 // A car that seems to stand as it was parked: how often it was turned all the same, and by how much it may be off.
 constexpr double kTurned = 1e-4;
 constexpr double kParkedYaw = 0.3 * kDegree;
+constexpr double kNothing = 1e-9;  // share of a hypothesis that no longer counts
 constexpr double kSameHeading = 10.0 * kDegree;
 
 // Roll and pitch that turn the mean specific force upright, with the yaw asked for.
@@ -127,6 +128,31 @@ void HeadingBank::normalise() {
     if (belief(i) > belief(leader_)) leader_ = i;
 }
 
+double HeadingBank::share(size_t i) const { return std::exp(belief(i) - belief(leader_)); }
+
+double HeadingBank::heading_std() const {
+  const double yaw = yaw_of(leader().state().q_enu_imu);
+  double total = 0.0, squares = 0.0;
+  for (size_t i = 0; i < cores_.size(); ++i) {
+    const double off = wrap_angle(yaw_of(cores_[i].state().q_enu_imu) - yaw), own = cores_[i].heading_std();
+    total += share(i);
+    squares += share(i) * (off * off + own * own);
+  }
+  return std::sqrt(squares / total);
+}
+
+ErrorMatrix HeadingBank::covariance() const {
+  ErrorMatrix sum = ErrorMatrix::Zero();
+  double total = 0.0;
+  for (size_t i = 0; i < cores_.size(); ++i) {
+    if (share(i) < kNothing) continue;
+    const ErrorVector off = local(leader().state(), cores_[i].state());
+    sum += share(i) * (cores_[i].covariance() + off * off.transpose());
+    total += share(i);
+  }
+  return sum / total;
+}
+
 bool HeadingBank::confirmed() const {
   if (cores_.empty()) return false;
   const double yaw = yaw_of(leader().state().q_enu_imu);
@@ -135,7 +161,7 @@ bool HeadingBank::confirmed() const {
   double others = 0.0, same = 0.0;
   for (size_t i = 0; i < cores_.size(); ++i) {
     const bool agrees = std::abs(wrap_angle(yaw_of(cores_[i].state().q_enu_imu) - yaw)) < kSameHeading;
-    (agrees ? same : others) += std::exp(belief(i) - belief(leader_));
+    (agrees ? same : others) += share(i);
   }
   return same / (same + others) > config_.alignment.confirm_probability;
 }

@@ -53,6 +53,11 @@ class HeadingBank {
   [[nodiscard]] const InsCore& leader() const { return cores_[leader_]; }
   /// True when one heading is left and known well.
   [[nodiscard]] bool confirmed() const;
+  /// rad, of all hypotheses about the leader's heading, as likely as each is.
+  [[nodiscard]] double heading_std() const;
+  /// Second moment of the error of the leader's state under all hypotheses: a sum of Gaussians has its own spread and
+  /// that of its means.
+  [[nodiscard]] ErrorMatrix covariance() const;
   void stop() { cores_.clear(); }
 
   /// `anchor` makes the filters that a reader fills.
@@ -77,6 +82,8 @@ class HeadingBank {
   void weigh(size_t i, const AidingRecord& r);
   /// Log weight of hypothesis i, with how likely a car drives as it says: forwards, unless it is slow.
   [[nodiscard]] double belief(size_t i) const;
+  /// Share of hypothesis i, not normalised.
+  [[nodiscard]] double share(size_t i) const;
   void normalise();
 
   GnssInsConfig config_;

@@ -30,6 +30,12 @@ class InsCore {
   /// One transition for all samples from now on, until covariance() is asked for: for carrying a copy a little ahead.
   void run_ahead() { ahead_ = true; }
 
+  /// P for its own, at the state's epoch.
+  void replace_covariance(const ErrorMatrix& P) {
+    flush();
+    P_ = P;
+  }
+
   /// Moves mean and covariance over the `dt` seconds that end at imu.t_us, (M.1)-(M.16).
   void predict(const ImuSample& imu, double dt, const ImuNoise& noise);
 
