@@ -96,6 +96,13 @@ std::optional<Fit> fit_at(const std::vector<ViewPair>& pairs, const Samples& sam
   if (static_cast<int>(rates.size()) < kLeastPairs) return std::nullopt;
   Fit fit;
   std::vector<double> weight(rates.size(), 1.0);
+  std::vector<double> of_direction(rates.size(), 0.0);  // weights over variance
+  const auto variance_of = [](const ViewPair& p) {
+    return kDirectionStd * kDirectionStd + 1.0 / p.direction_certainty;
+  };
+  for (size_t i = 0; i < rates.size(); ++i)
+    if (rates[i].camera.norm() < kSteady && rates[i].pair->direction_certainty > 0.0)
+      of_direction[i] = 1.0 / variance_of(*rates[i].pair);
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();
   for (int round = 0; round < 6; ++round) {
     Eigen::Vector3d mean_camera = Eigen::Vector3d::Zero(), mean_imu = Eigen::Vector3d::Zero();
@@ -110,10 +117,7 @@ std::optional<Fit> fit_at(const std::vector<ViewPair>& pairs, const Samples& sam
     Eigen::Matrix3d M = Eigen::Matrix3d::Zero();  // of Wahba's problem: sum w imu camera'
     for (size_t i = 0; i < rates.size(); ++i) {
       M += weight[i] / (kRateStd * kRateStd) * (rates[i].imu - mean_imu) * (rates[i].camera - mean_camera).transpose();
-      const ViewPair& p = *rates[i].pair;
-      if (rates[i].camera.norm() > kSteady || p.direction_certainty <= 0.0) continue;
-      const double variance = kDirectionStd * kDirectionStd + 1.0 / p.direction_certainty;
-      M += weight[i] / variance * forward * p.direction.transpose();
+      M += of_direction[i] * forward * rates[i].pair->direction.transpose();
     }
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Matrix3d U = svd.matrixU();
@@ -124,6 +128,9 @@ std::optional<Fit> fit_at(const std::vector<ViewPair>& pairs, const Samples& sam
     for (size_t i = 0; i < rates.size(); ++i) {
       const double e = (rates[i].imu - R * rates[i].camera - bias).norm() / (2.0 * kRateStd);
       weight[i] = 1.0 / (1.0 + e * e);
+      if (of_direction[i] == 0.0) continue;
+      const double variance = variance_of(*rates[i].pair);
+      of_direction[i] = 1.0 / (variance + 0.25 * (R * rates[i].pair->direction - forward).squaredNorm());
     }
   }
   double sum = 0.0;
@@ -135,10 +142,8 @@ std::optional<Fit> fit_at(const std::vector<ViewPair>& pairs, const Samples& sam
     sum += weight[i];
     const Eigen::Matrix3d S = skew(R * rates[i].camera);
     fit.information += weight[i] / (kRateStd * kRateStd) * S.transpose() * S;
-    const ViewPair& p = *rates[i].pair;
-    if (rates[i].camera.norm() > kSteady || p.direction_certainty <= 0.0) continue;
     const Eigen::Matrix3d D = skew(forward);
-    fit.information += weight[i] / (kDirectionStd * kDirectionStd + 1.0 / p.direction_certainty) * D.transpose() * D;
+    fit.information += of_direction[i] * D.transpose() * D;
   }
   for (size_t i = 1; i + 1 < rates.size(); ++i) {
     const double dt = seconds_between(rates[i - 1].pair->from_us, rates[i + 1].pair->from_us);
@@ -159,8 +164,10 @@ std::optional<ViewPair> view_pair(const SeenFrame& before, const SeenFrame& now)
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  // now to before
   Eigen::Vector3d t = Eigen::Vector3d::UnitZ();           // of now in before
   Eigen::Matrix<double, 5, 5> A;
+  double by_noise = 0.0;  // what A tells of t where nothing travels and the points only tremble
   for (int round = 0; round < kRounds; ++round) {
     A.setZero();
+    by_noise = 0.0;
     Eigen::Matrix<double, 5, 1> g = Eigen::Matrix<double, 5, 1>::Zero();
     const Eigen::Matrix3d R = q.toRotationMatrix();
     const Eigen::Matrix<double, 3, 2> B = across(t);
@@ -176,6 +183,7 @@ std::optional<ViewPair> view_pair(const SeenFrame& before, const SeenFrame& now)
       J.tail<2>() = scale * ray.cross(m.before).transpose() * B;
       const double w = 1.0 / (1.0 + e * e / (gate * gate));
       A += w * J.transpose() * J;
+      by_noise += w * 2.0 * (scale / m.px) * (scale / m.px) * kNoise_px * kNoise_px;
       g -= w * e * J.transpose();
     }
     A.diagonal().array() += 1e-6;
@@ -195,7 +203,7 @@ std::optional<ViewPair> view_pair(const SeenFrame& before, const SeenFrame& now)
   const Eigen::Matrix2d left = A.bottomRightCorner<2, 2>() - A.bottomLeftCorner<2, 3>() *
                                                                  A.topLeftCorner<3, 3>().inverse() *
                                                                  A.topRightCorner<3, 2>();
-  const double smallest = left.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() - 1.0;
+  const double smallest = left.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() - 1.0 - by_noise;
   pair.direction_certainty = std::max(0.0, smallest) / (kNoise_px * kNoise_px);
   pair.points = static_cast<int>(matches.size());
   return pair;

@@ -11,7 +11,8 @@ using namespace roadfix;
 namespace {
 
 constexpr double kOffset = 0.12;           // s
-constexpr double kTurnTolerance = 0.025;   // rad: 0.015 is what is left, of a sigma of 0.0024 (MODEL.md)
+constexpr double kTurnTolerance = 0.008;   // rad
+constexpr double kSigmas = 3.5;            // of three axes
 constexpr double kOffsetTolerance = 0.01;  // s
 constexpr double kLargestOffset = 0.2;     // s, of the search
 
@@ -39,6 +40,7 @@ TEST_CASE("a drive with turns tells how the camera sits and how late its stamps 
   std::printf("camera against imu: %.4f rad from the truth (sigma %.4f), offset %.4f s (sigma %.4f) of %.2f\n",
               turn_error(*found), found->turn_std, found->time_offset, found->time_offset_std, kOffset);
   CHECK(turn_error(*found) < kTurnTolerance);
+  CHECK(turn_error(*found) < kSigmas * found->turn_std);
   CHECK(std::abs(found->time_offset - kOffset) < kOffsetTolerance);
   // The same tracks through a camera turned by 6 degrees and stamped 30 ms later.
   const Eigen::Quaterniond turn = exp_q({0.06, 0.08, -0.04});
