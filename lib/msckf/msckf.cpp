@@ -18,6 +18,10 @@ constexpr double kMemory_s = 6.0;            // of imu samples before a start
 constexpr double kKept_s = 1.0;              // while running: a restart's pose is half a second old
 constexpr double kLineRest = 0.1;            // of the jitter that is left on the line
 constexpr double kShareMemory = 0.9;
+constexpr double kStillFor_s = 0.25;   // least that a picture has stood still when it is called so (Standing)
+constexpr double kUnseenWay = 0.05;    // m, standard deviation: a pixel or two of flow, seen from 15 m through 440 px
+constexpr double kSeenAfter_s = 2.0;   // of standing: what creeps has shown itself
+constexpr double kPulledAway = 3.0;    // sigma of a velocity that stood until now: the imu has felt the car start
 constexpr double kTurnSlack_s = 0.02;  // a picture may be this much newer than the samples
 
 int64_t micros(double s) { return static_cast<int64_t>(std::llround(1e6 * s)); }
@@ -152,6 +156,9 @@ bool Msckf::use(const SeenFrame& frame) {
   if (t_us < state_.imu.t_us) return true;
   propagate(t_us);
   stands_ = standing_.stands(t_us, state_.imu.v.norm());
+  // One picture that trembles does not end a stand.
+  if (stands_ && zero_us_ != 0 && seconds_between(zero_us_, t_us) > 2.0 * kStillFor_s)
+    stands_since_us_ = t_us - micros(kStillFor_s);
   use_picture(frame);
   use_vehicle(nullptr);
   judge(t_us);
@@ -215,13 +222,32 @@ void Msckf::use_tracks(bool window_full) {
     doubtful_us_ = state_.imu.t_us;
 }
 
-bool Msckf::try_linear(Linear linear) {
+bool Msckf::try_linear(Linear linear, double gate_sigma) {
   if (state_.held()) linear.expect(state_);
-  const double gate = config_.aiding.gate_sigma * config_.aiding.gate_sigma + 2.0 * linear.rows();
+  const double gate = gate_sigma * gate_sigma + 2.0 * linear.rows();
   if (linear.nis(state_) > gate) return false;
   update_.begin(state_);
   update_.add(linear);
   return update_.apply(state_);
+}
+
+void Msckf::use_standing() {
+  const MsckfAiding& a = config_.aiding;
+  const int64_t t_us = state_.imu.t_us;
+  const double stood = std::max(kStillFor_s, seconds_between(stands_since_us_, t_us));
+  const double since = seconds_between(zero_us_, t_us);
+  const bool on_end = since < kStillFor_s;
+  // (M.43): a still picture leaves a way unseen, wheels at rest leave nothing, and two seconds would have shown it.
+  const bool known = stood > kSeenAfter_s || standing_.wheels_rest(t_us);
+  const double unseen = known ? 0.0 : kUnseenWay / std::sqrt(stood * std::clamp(since, 0.01, kStillFor_s));
+  Linear rest = zero_velocity(state_, 1.0);
+  const double along = std::hypot(a.zero_velocity_std, unseen), across = std::hypot(a.zero_velocity_std, 0.1 * unseen);
+  rest.whiten(Eigen::Vector3d(along, across, across));  // cars pull away along their axis, but for the mounting
+  if (!try_linear(rest, on_end ? std::min(kPulledAway, a.gate_sigma) : a.gate_sigma)) return;
+  used_us_ = zero_us_ = t_us;
+  if (due(next_zero_us_, config_.trust.block_s) &&
+      standing_.block().end_us > next_zero_us_ - micros(2.0 * config_.trust.block_s))
+    (void)try_linear(zero_rate(state_, a, standing_.block().gyro), a.gate_sigma);
 }
 
 void Msckf::use_vehicle(const WheelSample* wheels) {
@@ -229,22 +255,16 @@ void Msckf::use_vehicle(const WheelSample* wheels) {
   const ImuSample& now = *std::lower_bound(imu_.begin(), imu_.end() - 1, state_.imu.t_us,
                                            [](const ImuSample& s, int64_t t) { return s.t_us < t; });
   stands_ = stands_ && standing_.stands(state_.imu.t_us, state_.imu.v.norm());
-  if (stands_ && a.use_zero_velocity) {
-    if (try_linear(zero_velocity(state_, a))) {
-      used_us_ = state_.imu.t_us;
-      if (due(next_zero_us_, config_.trust.block_s) &&
-          standing_.block().end_us > next_zero_us_ - micros(2.0 * config_.trust.block_s))
-        (void)try_linear(zero_rate(state_, a, standing_.block().gyro));
-    }
-  }
+  if (stands_ && a.use_zero_velocity) use_standing();
   if (wheels != nullptr && due(next_wheels_us_, a.wheel_interval)) {
-    if (try_linear(wheel_speed(state_, config_.vehicle, now.gyro, axle_speed(*wheels)))) scale_ = MsckfScale::kWheels;
+    if (try_linear(wheel_speed(state_, config_.vehicle, now.gyro, axle_speed(*wheels)), a.gate_sigma))
+      scale_ = MsckfScale::kWheels;
   }
   if (a.use_sideslip && !stands_ && due(next_sideslip_us_, a.sideslip_interval)) {
     const double lateral = state_.imu.rate(now.gyro).z() * (state_.imu.q.conjugate() * state_.imu.v).x();
-    (void)try_linear(no_sideslip(state_, config_, now.gyro, lateral));
+    (void)try_linear(no_sideslip(state_, config_, now.gyro, lateral), a.gate_sigma);
   }
-  if (a.use_planar && due(next_planar_us_, a.planar_interval)) (void)try_linear(level_road(state_, a));
+  if (a.use_planar && due(next_planar_us_, a.planar_interval)) (void)try_linear(level_road(state_, a), a.gate_sigma);
 }
 
 }  // namespace roadfix

@@ -104,7 +104,8 @@ class Msckf {
   void use_picture(const msckf::SeenFrame& frame);
   void use_tracks(bool window_full);
   void use_vehicle(const WheelSample* wheels);
-  bool try_linear(msckf::Linear linear);
+  void use_standing();
+  bool try_linear(msckf::Linear linear, double gate_sigma);
   [[nodiscard]] bool due(int64_t& next_us, double interval_s) const;
   [[nodiscard]] double axle_speed(const WheelSample& wheels) const;
   [[nodiscard]] int64_t picture_us(const msckf::SeenFrame& frame) const;
@@ -153,14 +154,16 @@ class Msckf {
   MsckfScale scale_ = MsckfScale::kUnknown;
   std::string reason_;
   bool stands_ = false;
+  Eigen::Vector3d begun_gyro_bias_ = Eigen::Vector3d::Zero();  ///< at the start
   int reset_counter_ = 0;
   SE3 reset_delta_;
   SE3 last_pose_;  ///< where a start goes on
   int64_t next_clone_ = 1;
   int64_t clone_us_ = 0;  ///< of the newest clone
   int64_t next_wheels_us_ = 0, next_sideslip_us_ = 0, next_planar_us_ = 0, next_zero_us_ = 0;
-  int64_t used_us_ = 0;      ///< last time that points or standing corrected the state
-  int64_t doubtful_us_ = 0;  ///< since when most points are refused; zero: they are not
+  int64_t stands_since_us_ = 0, zero_us_ = 0;  ///< as far as is known; last time that its velocity was taken for zero
+  int64_t used_us_ = 0;                        ///< last time that points or standing corrected the state
+  int64_t doubtful_us_ = 0;                    ///< since when most points are refused; zero: they are not
   double used_share_ = 1.0;
   int num_seen_ = 0;
 };

@@ -106,7 +106,7 @@ void Msckf::go_through(const MovingStart& plan, const Beginning& at, int64_t end
 
 void Msckf::begin_moving(const MovingStart& plan, const Beginning& at) {
   begin_at(plan.t_us, at.up, at.v, plan.speed_std, plan.tilt_std);
-  state_.imu.gyro_bias = at.gyro_bias;
+  state_.imu.gyro_bias = begun_gyro_bias_ = at.gyro_bias;
   state_.imu.accel_bias = at.accel_bias;
   state_.camera = at.camera;
   const Eigen::Matrix3d R = state_.imu.R();

@@ -42,6 +42,11 @@ void imu_sample(Archive& a, ImuSample& s) {
   a(s.t_us, s.gyro, s.accel);
 }
 
+template <class Archive>
+void calibrated(Archive& a, Calibrated& c) {
+  a(c.T_imu_camera.q.coeffs(), c.T_imu_camera.p, c.time_offset, c.wheel_scale, c.mounting);
+}
+
 constexpr size_t kMost = 1'000'000;
 
 }  // namespace
@@ -49,7 +54,7 @@ constexpr size_t kMost = 1'000'000;
 template <class Archive>
 void State::serialise(Archive& a) {
   a(imu.t_us, imu.q.coeffs(), imu.v, imu.p, imu.gyro_bias, imu.accel_bias, imu.gyro_scale, imu.accel_scale);
-  a(camera.T_imu_camera.q.coeffs(), camera.T_imu_camera.p, camera.time_offset, camera.wheel_scale, camera.mounting);
+  calibrated(a, camera);
   list(a, clones, kMaxClones, [&](Clone& c) { a(c.id, c.at, c.R, c.p); });
   list(a, landmarks, kMaxLandmarks, [&](Landmark& l) { a(l.track, l.anchor, l.at, l.f); });
   a(size_);
@@ -102,12 +107,14 @@ void Msckf::serialise(Archive& a) {
   for (std::optional<KnownSpeed>* speed : {&known_speed_, &wheel_speed_})
     optional(a, *speed, [&](KnownSpeed& s) { a(s.t_us, s.speed, s.sigma); });
   optional(a, planned_, [&](MovingStart& s) {
-    a(s.t_us, s.length_us, s.at.up, s.at.v, s.speed_std, s.side_std, s.tilt_std, s.scale);
+    a(s.t_us, s.length_us, s.at.up, s.at.v, s.at.gyro_bias, s.at.accel_bias, s.speed_std, s.side_std, s.tilt_std,
+      s.scale);
+    calibrated(a, s.at.camera);
   });
   int64_t stamp_us = stamps_.last_us();
   a(phase_, scale_, reason_, stands_, reset_counter_, reset_delta_.q.coeffs(), reset_delta_.p, last_pose_.q.coeffs(),
     last_pose_.p, stamp_us, next_clone_, clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_,
-    used_us_, doubtful_us_, used_share_, num_seen_);
+    stands_since_us_, zero_us_, begun_gyro_bias_, used_us_, doubtful_us_, used_share_, num_seen_);
   stamps_.set_last(stamp_us);
 }
 

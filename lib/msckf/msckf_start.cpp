@@ -12,6 +12,7 @@ using namespace msckf;
 namespace {
 
 constexpr double kStandingSpeedStd = 0.02;  // m/s
+constexpr double kUnseenSpeedStd = 0.1;     // m/s, where a still picture alone says that it stands
 constexpr double kEarthRate = 7.3e-5;       // rad/s: what standing cannot tell from a bias
 constexpr double kLevellingStd = 2e-3;      // rad, besides the accelerometer's bias
 constexpr double kGaugeStd = 1e-4;          // m and rad: where the frame begins is a convention
@@ -25,9 +26,15 @@ bool Msckf::start_standing(int64_t t_us) {
     return false;
   }
   const ImuBlock& block = standing_.block();
-  begin_at(t_us, block.accel.normalized(), Eigen::Vector3d::Zero(), kStandingSpeedStd, kLevellingStd);
+  // A still picture does not exclude that the car pulls away, (M.43): then the block's mean is not all gravity.
+  const bool rest = standing_.wheels_rest(t_us);
+  const double speed_std = rest ? kStandingSpeedStd : kUnseenSpeedStd;
+  const double levelling_std =
+      rest ? kLevellingStd : std::hypot(kLevellingStd, block.accel_wander / config_.vehicle.gravity);
+  begin_at(t_us, block.accel.normalized(), Eigen::Vector3d::Zero(), speed_std, levelling_std);
+  stands_since_us_ = block.end_us - static_cast<int64_t>(0.5e6 * config_.trust.block_s);
   // The gyro's mean is its bias.
-  state_.imu.gyro_bias = block.gyro;
+  state_.imu.gyro_bias = begun_gyro_bias_ = block.gyro;
   Eigen::MatrixXd& P = state_.P();
   const double variance =
       config_.vehicle.gyro_noise * config_.vehicle.gyro_noise / config_.trust.block_s + kEarthRate * kEarthRate;
@@ -89,7 +96,8 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   used_us_ = t_us;
   doubtful_us_ = 0;
   used_share_ = 1.0;
-  clone_us_ = 0;
+  clone_us_ = zero_us_ = 0;
+  begun_gyro_bias_.setZero();
   next_wheels_us_ = next_sideslip_us_ = next_planar_us_ = next_zero_us_ = 0;
 }
 
@@ -98,12 +106,14 @@ void Msckf::judge(int64_t t_us) {
   const ImuState& x = state_.imu;
   const MsckfTrust& trust = config_.trust;
   const auto too_large = [&](const Eigen::Vector3d& bias, double std) {
-    return bias.cwiseAbs().maxCoeff() > trust.max_bias_sigmas * std + 0.0;
+    return bias.cwiseAbs().maxCoeff() > trust.max_bias_sigmas * std;
   };
   if (!x.p.allFinite() || !x.v.allFinite() || !state_.P().diagonal().head(state_.size()).allFinite())
     return lose("the filter broke");
   if (x.v.norm() > trust.max_speed) return lose("the speed is impossible");
   if (too_large(x.accel_bias, config_.vehicle.accel_bias_std)) return lose("the accelerometer bias is impossible");
+  if (too_large(x.gyro_bias - begun_gyro_bias_, config_.vehicle.gyro_bias_std))
+    return lose("the gyro bias is impossible");
   if (doubtful_us_ != 0 && seconds_between(doubtful_us_, t_us) > trust.lost_after_s)
     return lose("most points do not fit");
   reason_.clear();

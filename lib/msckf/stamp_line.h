@@ -16,7 +16,8 @@ class StampLine {
   /// The moment of the next picture, by its stamp.
   int64_t on_time(int64_t stamp_us) {
     const auto waited = static_cast<double>(stamp_us - last_us_);
-    const double steps = period_us_ > 0.0 ? std::max(1.0, std::round(waited / period_us_)) : 0.0;
+    // Late by up to three quarters of a period is late; later is the next picture.
+    const double steps = period_us_ > 0.0 ? std::max(1.0, std::floor(waited / period_us_ + kEarly)) : 0.0;
     if (last_us_ == 0 || period_us_ <= 0.0 || steps > kLostSteps) return last_us_ = stamp_us;
     const double late_us = waited - steps * period_us_;
     last_us_ += std::llround(steps * period_us_ + (late_us < 0.0 ? late_us : kGain * late_us));
@@ -27,6 +28,7 @@ class StampLine {
 
  private:
   static constexpr double kGain = 0.02;       ///< of a late stamp; follows clocks that drift by 1e-3
+  static constexpr double kEarly = 0.25;      ///< of a period, by which a stamp may be before the line
   static constexpr double kLostSteps = 20.0;  ///< pictures lost before the line begins anew
 
   double period_us_;

@@ -105,6 +105,10 @@ void Standing::add_speed(int64_t t_us, double speed) {
   wheels_rest_ = std::abs(speed) < kWheelRest;
 }
 
+bool Standing::wheels_rest(int64_t t_us) const {
+  return wheels_us_ != 0 && t_us - wheels_us_ < kWheelAgeUs && wheels_rest_;
+}
+
 bool Standing::stands(int64_t t_us, std::optional<double> speed) const {
   const bool wheels_known = wheels_us_ != 0 && t_us - wheels_us_ < kWheelAgeUs;
   if (wheels_known && !wheels_rest_) return false;

@@ -27,6 +27,8 @@ class Standing {
   /// Imu quiet, picture still, wheels (if they spoke within a second) at rest. Without a picture, the imu and wheels
   /// must say it, or the filter itself, by `speed`.
   [[nodiscard]] bool stands(int64_t t_us, std::optional<double> speed) const;
+  /// Wheels spoke within a second, and were at rest.
+  [[nodiscard]] bool wheels_rest(int64_t t_us) const;
   [[nodiscard]] const ImuBlock& block() const { return block_; }
   /// Median motion of the tracks over the last half to whole second, px; nothing without enough of them.
   [[nodiscard]] const std::optional<double>& flow() const { return flow_; }

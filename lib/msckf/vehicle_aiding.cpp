@@ -55,13 +55,13 @@ Linear no_sideslip(const State& state, const MsckfConfig& config, const Eigen::V
   return linear;
 }
 
-Linear zero_velocity(const State& state, const MsckfAiding& aiding) {
+Linear zero_velocity(const State& state, double std) {
   Linear linear(3);
   const Eigen::Matrix3d R_imu_local = state.imu.R().transpose();
   linear.block(kVel, R_imu_local);
   const Eigen::Vector3d v_imu = R_imu_local * state.imu.v;
   linear.residual(-v_imu);
-  linear.whiten(Eigen::Vector3d::Constant(aiding.zero_velocity_std));
+  linear.whiten(Eigen::Vector3d::Constant(std));
   return linear;
 }
 

@@ -162,7 +162,7 @@ TEST_CASE("what is known of the vehicle has right derivatives") {
     return wheel_speed(s, config.vehicle, gyro, (1.0 + truth.camera.wheel_scale) * u);
   });
   check([&](const State& s, const State&) { return no_sideslip(s, config, gyro, 1.0); });
-  check([&](const State& s, const State&) { return zero_velocity(s, config.aiding); });
+  check([&](const State& s, const State&) { return zero_velocity(s, 0.01); });
   check([&](const State& s, const State&) { return zero_rate(s, config.aiding, {0.01, 0.0, 0.0}); });
   check([&](const State& s, const State&) { return level_road(s, config.aiding); });
 }
