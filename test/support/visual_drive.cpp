@@ -38,8 +38,9 @@ VisualDriveConfig city_drive(double duration_s) {
 }
 
 VisualDriveConfig highway_drive(double duration_s) {
-  VisualDriveConfig c = city_drive(duration_s);
-  c.scenario.motion.route = RouteKind::kHighway;
+  VisualDriveConfig c;
+  c.scenario = scenario("highway");
+  c.scenario.duration_s = duration_s;
   c.street = StreetKind::kHighway;
   return c;
 }

@@ -29,6 +29,7 @@ struct VisualDriveConfig {
 
 /// City street seen by one camera, imu without mounting errors, biases constant.
 VisualDriveConfig city_drive(double duration_s);
+/// The scenario of that name, biases drifting as it says.
 VisualDriveConfig highway_drive(double duration_s);
 /// A minute straight on at constant speed after a start from rest, a right angle to the left, twelve seconds more.
 VisualDriveConfig turn_drive();
