@@ -12,7 +12,7 @@ using namespace msckf;
 namespace {
 
 constexpr double kStandingSpeedStd = 0.02;  // m/s
-constexpr double kUnseenSpeedStd = 0.1;     // m/s, where a still picture alone says that it stands
+constexpr double kUnseenSpeedStd = 0.05;    // m/s, where a still picture alone says that it stands
 constexpr double kEarthRate = 7.3e-5;       // rad/s: what standing cannot tell from a bias
 constexpr double kLevellingStd = 2e-3;      // rad, besides the accelerometer's bias
 constexpr double kGaugeStd = 1e-4;          // m and rad: where the frame begins is a convention
