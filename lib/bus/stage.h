@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "stream/digest.h"
 #include "stream/spec.h"
 
@@ -104,7 +104,7 @@ class Stage {
   /// Asked after each publish(): whether a snapshot now, beside the periodic ones, is worth its size.
   [[nodiscard]] virtual bool wants_snapshot() const { return false; }
 
-  /// What the next start of the process may begin with (bus/stage_memory.h). Empty: nothing worth keeping yet.
+  /// What the next start of the process may begin with (bus/run/stage_memory.h). Empty: nothing worth keeping yet.
   [[nodiscard]] virtual std::vector<uint8_t> memory() const { return {}; }
 
   /// YAML, defaults included.

@@ -5,9 +5,9 @@
 #include <roadfix/state_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/message.h"
-#include "bus/publish_slot.h"
+#include "bus/run/publish_slot.h"
 #include "bus/sample_codec.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
 #include "gnss_ins/gnss_ins.h"

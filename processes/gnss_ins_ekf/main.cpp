@@ -1,4 +1,4 @@
-#include "bus/run_process.h"
+#include "bus/run/run_process.h"
 #include "gnss_ins_ekf/handler.h"
 
 int main(int argc, char** argv) {

@@ -4,8 +4,8 @@
 #include <roadfix/ins_status_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 
-#include "bus/message.h"
-#include "bus/publish_slot.h"
+#include "bus/run/publish_slot.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "fusion/outlook.h"
 #include "geodesy/enu_change.h"

@@ -1,4 +1,4 @@
-#include "bus/run_process.h"
+#include "bus/run/run_process.h"
 #include "imm_fusion/handler.h"
 
 int main(int argc, char** argv) {

@@ -7,8 +7,8 @@
 #include <roadfix/mag_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/message.h"
 #include "bus/sample_codec.h"
+#include "bus/types/message.h"
 #include "geometry/frames.h"
 #include "monitor/messages.h"
 #include "stream/digest.h"

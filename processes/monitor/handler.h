@@ -7,7 +7,7 @@
 #include <string>
 
 #include "bus/bus.h"
-#include "bus/schema.h"
+#include "bus/types/schema.h"
 #include "health/health.h"
 #include "monitor/monitor_config.h"
 

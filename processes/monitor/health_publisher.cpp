@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "monitor/messages.h"
 
 namespace roadfix {

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "bus/bus.h"
-#include "bus/process_facts.h"
-#include "bus/unsent_watch.h"
+#include "bus/run/process_facts.h"
+#include "bus/run/unsent_watch.h"
 #include "monitor/handler.h"
 
 namespace roadfix {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "bus/run_clock.h"
+#include "bus/run/run_clock.h"
 #include "health/health.h"
 
 namespace roadfix {

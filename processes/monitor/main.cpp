@@ -1,8 +1,8 @@
 // The monitor: may the estimate be used, and if not, why. Live on the bus, or over logs.
 #include <CLI/CLI.hpp>
 
-#include "bus/command_line.h"
-#include "bus/run_process.h"
+#include "bus/run/command_line.h"
+#include "bus/run/run_process.h"
 #include "monitor/monitor_run.h"
 
 int main(int argc, char** argv) {

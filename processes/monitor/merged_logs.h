@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
+#include "bus/log/log_reader.h"
+#include "bus/types/message.h"
 
 namespace roadfix {
 

@@ -4,11 +4,11 @@
 #include <memory>
 #include <thread>
 
-#include "bus/log_writer.h"
-#include "bus/message.h"
-#include "bus/run_clock.h"
-#include "bus/run_process.h"
-#include "bus/service.h"
+#include "bus/log/log_writer.h"
+#include "bus/run/run_clock.h"
+#include "bus/run/run_process.h"
+#include "bus/run/service.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "monitor/dashboard.h"
 #include "monitor/handler.h"

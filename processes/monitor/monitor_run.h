@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/network_bus.h"
+#include "bus/transport/network_bus.h"
 #include "monitor/monitor_config.h"
 
 namespace roadfix {
@@ -22,7 +22,7 @@ struct MonitorOptions {
   bool print_config = false;
 };
 
-/// Until stop_requested() (bus/run_process.h) or, without a dashboard, the end of the log. Throws what the user can
+/// Until stop_requested() (bus/run/run_process.h) or, without a dashboard, the end of the log. Throws what the user can
 /// mend.
 void run_monitor(const MonitorOptions& options);
 

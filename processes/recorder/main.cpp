@@ -5,11 +5,11 @@
 #include <ctime>
 #include <iostream>
 
-#include "bus/command_line.h"
-#include "bus/network_bus.h"
-#include "bus/run_clock.h"
-#include "bus/run_process.h"
-#include "bus/service.h"
+#include "bus/run/command_line.h"
+#include "bus/run/run_clock.h"
+#include "bus/run/run_process.h"
+#include "bus/run/service.h"
+#include "bus/transport/network_bus.h"
 #include "config/config.h"
 #include "recorder/recorder_heartbeat.h"
 #include "recorder/recording_thread.h"

@@ -5,8 +5,8 @@
 #include <roadfix/heartbeat_t.hpp>
 #include <stdexcept>
 
-#include "bus/message.h"
-#include "bus/stage_runner.h"
+#include "bus/run/stage_runner.h"
+#include "bus/types/message.h"
 
 namespace roadfix {
 

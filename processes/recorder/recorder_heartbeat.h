@@ -7,9 +7,9 @@
 #include <string>
 
 #include "bus/bus.h"
-#include "bus/process_facts.h"
-#include "bus/run_clock.h"
-#include "bus/unsent_watch.h"
+#include "bus/run/process_facts.h"
+#include "bus/run/run_clock.h"
+#include "bus/run/unsent_watch.h"
 
 namespace roadfix {
 

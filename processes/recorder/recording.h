@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/log_writer.h"
+#include "bus/log/log_writer.h"
 #include "recorder/recorder_config.h"
 
 namespace roadfix {

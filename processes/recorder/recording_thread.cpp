@@ -1,6 +1,6 @@
 #include "recorder/recording_thread.h"
 
-#include "bus/run_clock.h"
+#include "bus/run/run_clock.h"
 
 namespace roadfix {
 

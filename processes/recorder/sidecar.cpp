@@ -8,8 +8,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "bus/process_facts.h"
-#include "bus/schema.h"
+#include "bus/run/process_facts.h"
+#include "bus/types/schema.h"
 #include "type_text.h"
 
 namespace roadfix {

@@ -10,10 +10,10 @@
 #include <roadfix/imu_t.hpp>
 #include <stdexcept>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
+#include "bus/log/log_reader.h"
 #include "bus/sample_codec.h"
-#include "bus/schema.h"
+#include "bus/types/message.h"
+#include "bus/types/schema.h"
 #include "config/calibration.h"
 #include "features/front_end.h"
 #include "geometry/frames.h"

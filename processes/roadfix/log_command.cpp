@@ -6,9 +6,9 @@
 #include <memory>
 #include <regex>
 
-#include "bus/log_survey.h"
-#include "bus/log_writer.h"
-#include "bus/message.h"
+#include "bus/log/log_survey.h"
+#include "bus/log/log_writer.h"
+#include "bus/types/message.h"
 #include "roadfix/commands.h"
 
 namespace roadfix {

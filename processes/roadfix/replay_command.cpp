@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-#include "bus/replay.h"
+#include "bus/run/replay.h"
 #include "roadfix/commands.h"
 #include "roadfix/stages.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <thread>
 
-#include "bus/service.h"
+#include "bus/run/service.h"
 #include "config/config.h"
 #include "roadfix/commands.h"
 #include "roadfix/supervise/supervisor.h"

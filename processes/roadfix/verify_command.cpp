@@ -5,7 +5,7 @@
 #include <iostream>
 #include <memory>
 
-#include "bus/verify.h"
+#include "bus/verify/verify.h"
 #include "roadfix/commands.h"
 #include "roadfix/stages.h"
 
@@ -78,7 +78,9 @@ void add_verify_command(CLI::App& app) {
   const auto arguments = std::make_shared<VerifyArguments>();
   CLI::App* command =
       app.add_subcommand("verify", "Compute a recorded drive again and compare every output, byte for byte");
-  command->add_option("DRIVE", arguments->logs, "The recording: one log, or all files that it was split into, of several hosts' recorders too")
+  command
+      ->add_option("DRIVE", arguments->logs,
+                   "The recording: one log, or all files that it was split into, of several hosts' recorders too")
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("--config", arguments->config, "The vehicle's configuration folder")->required();

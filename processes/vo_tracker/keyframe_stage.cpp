@@ -4,8 +4,8 @@
 #include <roadfix/image_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/message.h"
 #include "bus/sample_codec.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "slam/keyframe_tracker.h"
 #include "stream/thread_pool.h"

@@ -1,4 +1,4 @@
-#include "bus/run_process.h"
+#include "bus/run/run_process.h"
 #include "vo_tracker/handler.h"
 
 int main(int argc, char** argv) {

@@ -9,8 +9,8 @@
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/message.h"
 #include "bus/sample_codec.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
 #include "vo_tracker/camera_rig.h"

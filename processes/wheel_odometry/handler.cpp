@@ -9,9 +9,9 @@
 #include <roadfix/wheels_t.hpp>
 #include <variant>
 
-#include "bus/message.h"
-#include "bus/publish_slot.h"
+#include "bus/run/publish_slot.h"
 #include "bus/sample_codec.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
 

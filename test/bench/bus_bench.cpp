@@ -2,7 +2,7 @@
 // (proof.replay_dispatch_us): reading the log, order, check, ledger, digest included.
 #include <benchmark/benchmark.h>
 
-#include "bus/replay.h"
+#include "bus/run/replay.h"
 #include "support/small_drive.h"
 #include "support/temporary_folder.h"
 

@@ -16,9 +16,9 @@
 #include <lcm/lcm-cpp.hpp>
 #include <thread>
 
-#include "bus/log_index.h"
-#include "bus/log_writer.h"
-#include "bus/network_bus.h"
+#include "bus/log/log_index.h"
+#include "bus/log/log_writer.h"
+#include "bus/transport/network_bus.h"
 #include "support/temporary_folder.h"
 
 using namespace roadfix;

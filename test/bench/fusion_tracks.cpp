@@ -7,8 +7,8 @@
 #include <roadfix/wheels_t.hpp>
 #include <stdexcept>
 
-#include "bus/log_writer.h"
-#include "bus/replay.h"
+#include "bus/log/log_writer.h"
+#include "bus/run/replay.h"
 #include "bus/sample_codec.h"
 #include "config/calibration.h"
 #include "geometry/determinism.h"

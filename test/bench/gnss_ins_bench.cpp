@@ -8,9 +8,9 @@
 #include <roadfix/mag_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
+#include "bus/log/log_reader.h"
 #include "bus/sample_codec.h"
+#include "bus/types/message.h"
 #include "config/calibration.h"
 #include "gnss_ins/gnss_ins.h"
 #include "gnss_ins_ekf/handler.h"

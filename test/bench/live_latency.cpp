@@ -9,9 +9,9 @@
 #include <roadfix/pose_t.hpp>
 #include <vector>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
-#include "bus/schema.h"
+#include "bus/log/log_reader.h"
+#include "bus/types/message.h"
+#include "bus/types/schema.h"
 
 namespace {
 

@@ -8,10 +8,10 @@
 #include <map>
 #include <thread>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
-#include "bus/network_bus.h"
-#include "bus/run_clock.h"
+#include "bus/log/log_reader.h"
+#include "bus/run/run_clock.h"
+#include "bus/transport/network_bus.h"
+#include "bus/types/message.h"
 
 namespace {
 

@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <roadfix/image_t.hpp>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
-#include "bus/stage_runner.h"
+#include "bus/log/log_reader.h"
+#include "bus/run/stage_runner.h"
+#include "bus/types/message.h"
 #include "geometry/determinism.h"
 #include "program.h"
 #include "vo_tracker/handler.h"

@@ -1,5 +1,5 @@
 // A stage's process for the live tests: the last folder of --config names the stage (odometry, filter or fusion).
-#include "bus/run_process.h"
+#include "bus/run/run_process.h"
 #include "support/chain_stage.h"
 
 int main(int argc, char** argv) {

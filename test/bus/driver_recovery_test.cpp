@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "bus/log_reader.h"
-#include "bus/log_writer.h"
+#include "bus/log/log_reader.h"
+#include "bus/log/log_writer.h"
 #include "drivers/device/run_driver.h"
 #include "drivers/gnss_driver/handler.h"
 #include "drivers/imu_driver/handler.h"

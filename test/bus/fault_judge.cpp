@@ -23,10 +23,10 @@
 #include <set>
 #include <sstream>
 
-#include "bus/network_bus.h"
-#include "bus/run_process.h"
+#include "bus/run/run_process.h"
 #include "bus/sample_codec.h"
-#include "bus/schema.h"
+#include "bus/transport/network_bus.h"
+#include "bus/types/schema.h"
 #include "geodesy/enu_change.h"
 #include "geometry/frames.h"
 

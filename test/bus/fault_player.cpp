@@ -22,9 +22,9 @@
 #include <thread>
 
 #include "bus/forged.h"
-#include "bus/log_reader.h"
-#include "bus/network_bus.h"
-#include "bus/run_clock.h"
+#include "bus/log/log_reader.h"
+#include "bus/run/run_clock.h"
+#include "bus/transport/network_bus.h"
 
 namespace {
 

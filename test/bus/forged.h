@@ -26,7 +26,7 @@
 #include <utility>
 #include <vector>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 
 namespace roadfix::test {
 

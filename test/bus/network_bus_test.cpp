@@ -1,6 +1,6 @@
 // The bus over real UDP, in a network namespace: no silent limit, nothing dropped without a count, and what a handler
 // throws does not pass through LCM's C code.
-#include "bus/network_bus.h"
+#include "bus/transport/network_bus.h"
 
 #include <catch2/catch.hpp>
 #include <cstdlib>

@@ -4,7 +4,7 @@
 #include <iostream>
 #include <thread>
 
-#include "bus/network_bus.h"
+#include "bus/transport/network_bus.h"
 #include "support/small_drive.h"
 
 int main(int argc, char** argv) {

@@ -11,7 +11,7 @@
 #include <roadfix/heartbeat_t.hpp>
 #include <roadfix/raw_t.hpp>
 
-#include "bus/network_bus.h"
+#include "bus/transport/network_bus.h"
 #include "support/driver_run.h"
 #include "support/temporary_folder.h"
 

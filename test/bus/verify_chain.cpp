@@ -3,8 +3,8 @@
 #include <iostream>
 #include <roadfix/heartbeat_t.hpp>
 
-#include "bus/stage_runner.h"
-#include "bus/verify.h"
+#include "bus/run/stage_runner.h"
+#include "bus/verify/verify.h"
 #include "support/chain_stage.h"
 
 namespace {

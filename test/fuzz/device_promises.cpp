@@ -8,7 +8,7 @@
 #include <roadfix/pose_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/schema.h"
+#include "bus/types/schema.h"
 
 namespace roadfix::test {
 

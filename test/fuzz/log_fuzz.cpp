@@ -1,8 +1,8 @@
 // Any bytes as an event log: the reader ends, reports what it steps over, and every byte is in an event or in damage.
 #include <cstdlib>
 
-#include "bus/log_reader.h"
-#include "bus/log_survey.h"
+#include "bus/log/log_reader.h"
+#include "bus/log/log_survey.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, std::size_t size) {
   roadfix::LogReader reader(std::span<const uint8_t>(data, size), "fuzz.lcm");

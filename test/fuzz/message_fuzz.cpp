@@ -9,8 +9,8 @@
 #include <roadfix/state_t.hpp>
 #include <roadfix/vo_features_t.hpp>
 
-#include "bus/field_difference.h"
-#include "bus/message.h"
+#include "bus/types/field_difference.h"
+#include "bus/types/message.h"
 
 namespace {
 

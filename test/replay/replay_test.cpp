@@ -1,4 +1,4 @@
-#include "bus/replay.h"
+#include "bus/run/replay.h"
 
 #include <catch2/catch.hpp>
 #include <fstream>

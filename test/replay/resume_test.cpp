@@ -1,6 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "bus/stage_runner.h"
+#include "bus/run/stage_runner.h"
 #include "support/chain_stage.h"
 #include "support/small_drive.h"
 

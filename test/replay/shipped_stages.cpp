@@ -2,7 +2,7 @@
 
 #include <roadfix/vo_status_t.hpp>
 
-#include "bus/log_reader.h"
+#include "bus/log/log_reader.h"
 #include "config/config.h"
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"

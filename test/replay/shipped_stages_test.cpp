@@ -6,9 +6,9 @@
 #include <set>
 #include <thread>
 
-#include "bus/stage_memory.h"
-#include "bus/stage_runner.h"
-#include "bus/verify.h"
+#include "bus/run/stage_memory.h"
+#include "bus/run/stage_runner.h"
+#include "bus/verify/verify.h"
 #include "roadfix/stages.h"
 #include "support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "bus/verify.h"
+#include "bus/verify/verify.h"
 
 #include <catch2/catch.hpp>
 #include <random>

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "bus/log_reader.h"
-#include "bus/log_writer.h"
-#include "bus/memory_bus.h"
+#include "bus/log/log_reader.h"
+#include "bus/log/log_writer.h"
+#include "bus/transport/memory_bus.h"
 #include "drivers/device/live_driver.h"
 #include "drivers/device/run_driver.h"
 #include "support/driver_run.h"

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "bus/memory_bus.h"
-#include "bus/message.h"
+#include "bus/transport/memory_bus.h"
+#include "bus/types/message.h"
 
 namespace roadfix::test {
 

@@ -6,8 +6,8 @@
 #include <memory>
 #include <random>
 
-#include "bus/log_reader.h"
-#include "bus/stage_runner.h"
+#include "bus/log/log_reader.h"
+#include "bus/run/stage_runner.h"
 #include "support/chain_stage.h"
 #include "support/small_drive.h"
 

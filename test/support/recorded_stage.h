@@ -3,9 +3,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "bus/live_stage.h"
-#include "bus/memory_bus.h"
-#include "bus/verify.h"
+#include "bus/run/live_stage.h"
+#include "bus/transport/memory_bus.h"
+#include "bus/verify/verify.h"
 #include "support/recorded_car.h"
 #include "support/temporary_folder.h"
 

@@ -8,8 +8,8 @@
 #include <roadfix/pose_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/log_writer.h"
-#include "bus/message.h"
+#include "bus/log/log_writer.h"
+#include "bus/types/message.h"
 
 namespace roadfix::test {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <memory>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "drivers/device/byte_source.h"
 
 namespace roadfix {

@@ -4,7 +4,7 @@
 #include <roadfix/heartbeat_t.hpp>
 #include <roadfix/raw_t.hpp>
 
-#include "bus/stage_runner.h"
+#include "bus/run/stage_runner.h"
 #include "config/config_hash.h"
 
 namespace roadfix {

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "bus/bus.h"
-#include "bus/process_facts.h"
-#include "bus/run_clock.h"
-#include "bus/unsent_watch.h"
+#include "bus/run/process_facts.h"
+#include "bus/run/run_clock.h"
+#include "bus/run/unsent_watch.h"
 #include "drivers/device/device_session.h"
 #include "drivers/device/driver.h"
 

@@ -3,13 +3,13 @@
 #include <iostream>
 #include <roadfix/raw_t.hpp>
 
-#include "bus/command_line.h"
-#include "bus/log_reader.h"
-#include "bus/log_writer.h"
-#include "bus/network_bus.h"
-#include "bus/run_process.h"
-#include "bus/schema.h"
-#include "bus/service.h"
+#include "bus/log/log_reader.h"
+#include "bus/log/log_writer.h"
+#include "bus/run/command_line.h"
+#include "bus/run/run_process.h"
+#include "bus/run/service.h"
+#include "bus/transport/network_bus.h"
+#include "bus/types/schema.h"
 #include "drivers/device/live_driver.h"
 
 namespace roadfix {

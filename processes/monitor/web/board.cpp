@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 
 namespace roadfix {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "monitor/messages.h"

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
-#include "bus/schema.h"
+#include "bus/log/log_reader.h"
+#include "bus/types/message.h"
+#include "bus/types/schema.h"
 #include "config/config.h"
 #include "geodesy/enu_change.h"
 #include "geometry/frames.h"

@@ -8,8 +8,8 @@
 #include <roadfix/config_t.hpp>
 #include <stdexcept>
 
-#include "bus/log_writer.h"
-#include "bus/message.h"
+#include "bus/log/log_writer.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "config/config_hash.h"
 #include "roadfix/import/drive_messages.h"

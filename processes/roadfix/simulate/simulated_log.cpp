@@ -8,8 +8,8 @@
 #include <roadfix/config_t.hpp>
 #include <sstream>
 
-#include "bus/log_writer.h"
-#include "bus/message.h"
+#include "bus/log/log_writer.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "config/config_hash.h"
 #include "geometry/frames.h"

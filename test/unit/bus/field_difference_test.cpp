@@ -1,4 +1,4 @@
-#include "bus/field_difference.h"
+#include "bus/types/field_difference.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 
 using namespace roadfix;
 

@@ -1,9 +1,9 @@
-#include "bus/live_stage.h"
+#include "bus/run/live_stage.h"
 
 #include <catch2/catch.hpp>
 
-#include "bus/log_bus.h"
-#include "bus/memory_bus.h"
+#include "bus/transport/log_bus.h"
+#include "bus/transport/memory_bus.h"
 #include "support/chain_stage.h"
 #include "support/outage_bus.h"
 #include "support/small_drive.h"

@@ -4,8 +4,8 @@
 #include <lcm/lcm-cpp.hpp>
 #include <random>
 
-#include "bus/log_reader.h"
-#include "bus/log_writer.h"
+#include "bus/log/log_reader.h"
+#include "bus/log/log_writer.h"
 #include "support/temporary_folder.h"
 
 using namespace roadfix;

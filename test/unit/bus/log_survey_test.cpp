@@ -1,4 +1,4 @@
-#include "bus/log_survey.h"
+#include "bus/log/log_survey.h"
 
 #include <catch2/catch.hpp>
 

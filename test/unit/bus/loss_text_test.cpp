@@ -1,7 +1,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
-#include "bus/output_difference.h"
+#include "bus/verify/output_difference.h"
 
 using namespace roadfix;
 

@@ -1,4 +1,4 @@
-#include "bus/run_clock.h"
+#include "bus/run/run_clock.h"
 
 #include <catch2/catch.hpp>
 

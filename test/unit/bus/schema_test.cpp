@@ -1,4 +1,4 @@
-#include "bus/schema.h"
+#include "bus/types/schema.h"
 
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -24,7 +24,7 @@
 #include <roadfix/wheels_t.hpp>
 #include <set>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "support/shared_data.h"
 
 using namespace roadfix;

@@ -1,4 +1,4 @@
-#include "bus/service.h"
+#include "bus/run/service.h"
 
 #include <sys/socket.h>
 #include <sys/un.h>

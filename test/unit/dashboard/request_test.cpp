@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "monitor/web/page.h"
 #include "monitor/web/server.h"
 

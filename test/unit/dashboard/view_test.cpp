@@ -6,7 +6,7 @@
 #include <roadfix/image_t.hpp>
 #include <roadfix/pose_t.hpp>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "monitor/handler.h"
 
 using namespace roadfix;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "bus/log_writer.h"
-#include "bus/message.h"
+#include "bus/log/log_writer.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "evaluation/drive_facts.h"
 #include "geometry/frames.h"

@@ -10,8 +10,8 @@
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 
+#include "bus/run/stage_runner.h"
 #include "bus/sample_codec.h"
-#include "bus/stage_runner.h"
 #include "fusion/planar.h"
 #include "geodesy/enu_change.h"
 #include "geometry/frames.h"

@@ -6,8 +6,8 @@
 #include <roadfix/config_t.hpp>
 #include <set>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
+#include "bus/log/log_reader.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <map>
 
-#include "bus/log_reader.h"
+#include "bus/log/log_reader.h"
 #include "roadfix/import/drive_folder.h"
 #include "roadfix/import/drive_log.h"
 #include "roadfix/import/source.h"

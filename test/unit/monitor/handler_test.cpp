@@ -4,7 +4,7 @@
 #include <roadfix/imu_t.hpp>
 #include <roadfix/pose_t.hpp>
 
-#include "bus/message.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "monitor/handler.h"
 #include "monitor/health_publisher.h"

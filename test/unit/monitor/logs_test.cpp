@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 #include <roadfix/imu_t.hpp>
 
-#include "bus/log_writer.h"
-#include "bus/message.h"
-#include "bus/replay.h"
+#include "bus/log/log_writer.h"
+#include "bus/run/replay.h"
+#include "bus/types/message.h"
 #include "monitor/handler.h"
 #include "monitor/merged_logs.h"
 #include "roadfix/stages.h"

@@ -7,7 +7,7 @@
 #include <iomanip>
 #include <nlohmann/json.hpp>
 
-#include "bus/log_reader.h"
+#include "bus/log/log_reader.h"
 
 namespace roadfix {
 namespace {

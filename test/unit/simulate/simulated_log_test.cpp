@@ -10,8 +10,8 @@
 #include <roadfix/imu_t.hpp>
 #include <roadfix/pose_t.hpp>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
+#include "bus/log/log_reader.h"
+#include "bus/types/message.h"
 #include "config/config.h"
 #include "roadfix/simulate/scenario_file.h"
 #include "simulation/scenarios.h"

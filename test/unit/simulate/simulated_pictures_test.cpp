@@ -6,8 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <roadfix/image_t.hpp>
 
-#include "bus/log_reader.h"
-#include "bus/message.h"
+#include "bus/log/log_reader.h"
+#include "bus/types/message.h"
 #include "roadfix/simulate/simulated_log.h"
 #include "simulation/scenarios.h"
 #include "simulation/scene/film.h"

@@ -4,8 +4,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <roadfix/image_t.hpp>
 
-#include "bus/message.h"
-#include "bus/stage_runner.h"
+#include "bus/run/stage_runner.h"
+#include "bus/types/message.h"
 #include "support/street.h"
 
 namespace roadfix::test {

@@ -6,8 +6,8 @@
 #include <roadfix/pose_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
-#include "bus/message.h"
-#include "bus/stage_runner.h"
+#include "bus/run/stage_runner.h"
+#include "bus/types/message.h"
 #include "simulation/scenarios.h"
 #include "simulation/simulate.h"
 

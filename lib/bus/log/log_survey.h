@@ -1,0 +1,36 @@
+/// What is in a log, and what is wrong with it.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bus/log/log_reader.h"
+
+namespace roadfix {
+
+struct ChannelSurvey {
+  std::string type;  ///< of the first message; "unknown" where its fingerprint is none of ours
+  int64_t events = 0;
+  uint64_t bytes = 0;
+  int64_t first_utime = 0;  ///< by the messages' own time, where the type is ours; otherwise the events'
+  int64_t last_utime = 0;
+  int64_t undecodable = 0;  ///< of a type of ours, and broken; or of another type than the first
+  int64_t missing = 0;      ///< gaps in seq
+  int64_t repeated = 0;     ///< messages that are there twice
+  std::set<int64_t> runs;
+
+  [[nodiscard]] double rate_hz() const;
+};
+
+struct LogSurvey {
+  std::map<std::string, ChannelSurvey> channels;
+  int64_t events = 0;
+  int64_t backward_stamps = 0;  ///< events stamped earlier than the one before
+  std::vector<LogDamage> damage;
+};
+
+LogSurvey survey_log(LogReader& reader);
+
+}  // namespace roadfix

@@ -1,0 +1,119 @@
+#include "bus/log/log_writer.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include "bus/types/message.h"
+
+namespace roadfix {
+
+namespace {
+
+/// Small enough to be full, and so in memory, after the first second of a drive: what it takes never grows.
+constexpr std::size_t kBufferBytes = std::size_t{64} << 10;
+constexpr const char* kNotTaken = "cannot write the log";
+
+void store(uint8_t* to, uint64_t value, int size) {
+  for (int i = 0; i < size; ++i) to[i] = static_cast<uint8_t>(value >> (8 * (size - 1 - i)));
+}
+
+}  // namespace
+
+LogWriter::LogWriter(const std::filesystem::path& path, Mode mode) : path_(path), written_path_(path), mode_(mode) {
+  if (mode == Mode::kWhole) written_path_ += ".part";
+  fd_ = ::open(written_path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  if (fd_ < 0) throw_log_error(written_path_, "cannot create the log");
+  if (::flock(fd_, LOCK_EX | LOCK_NB) != 0 ||
+      (::ftruncate(fd_, 0) != 0 && errno != EINVAL)) {  // EINVAL: a pipe or device
+    ::close(fd_);
+    throw_log_error(written_path_, "cannot take the log for writing (does another process write it?)");
+  }
+  buffer_.reserve(kBufferBytes);
+}
+
+LogWriter::~LogWriter() {
+  if (fd_ < 0) return;
+  if (mode_ == Mode::kWhole) {
+    ::unlink(written_path_.c_str());
+  } else {
+    try {
+      flush(false);
+    } catch (const LogError&) {
+      // A destructor cannot report; whoever wants to know calls commit().
+    }
+  }
+  ::close(fd_);
+}
+
+void LogWriter::write(std::string_view channel, int64_t timestamp_us, std::span<const uint8_t> data) {
+  if (channel.empty() || channel.size() > kMaxChannelBytes || data.size() > kMaxMessageBytes) {
+    throw LogError(path_.string() + ": channel '" + std::string(channel) + "' with " + std::to_string(data.size()) +
+                   " bytes does not fit into an LCM log (names of 1 to 63 characters, 2^28 bytes)");
+  }
+  uint8_t head[kLogHeadBytes];
+  store(head, kLogMagic, 4);
+  store(head + 4, static_cast<uint64_t>(events_), 8);
+  store(head + 12, static_cast<uint64_t>(timestamp_us), 8);
+  store(head + 20, channel.size(), 4);
+  store(head + 24, data.size(), 4);
+  put(head, sizeof head);
+  put(channel.data(), channel.size());
+  put(data.data(), data.size());
+  ++events_;
+}
+
+void LogWriter::put(const void* data, std::size_t size) {
+  if (buffer_.size() + size > kBufferBytes) flush(false);
+  const auto* begin = static_cast<const uint8_t*>(data);
+  if (size > kBufferBytes) {
+    // A buffer that took it would keep the size of the largest message ever.
+    if (hand_out({begin, size}) < size) throw_log_error(written_path_, kNotTaken);
+  } else {
+    buffer_.insert(buffer_.end(), begin, begin + size);
+  }
+  bytes_ += size;
+  hash_.add(data, size);
+}
+
+/// How much of it the system took; less than all: errno says why.
+std::size_t LogWriter::hand_out(std::span<const uint8_t> data) const {
+  std::size_t done = 0;
+  while (done < data.size()) {
+    const ssize_t n = ::write(fd_, data.data() + done, data.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  return done;
+}
+
+void LogWriter::flush(bool to_disk) {
+  if (const std::size_t done = hand_out(buffer_); done < buffer_.size()) {
+    const int why = errno;
+    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(done));
+    errno = why;
+    throw_log_error(written_path_, kNotTaken);
+  }
+  buffer_.clear();
+  if (to_disk && ::fdatasync(fd_) != 0 && errno != EINVAL) throw_log_error(written_path_, kNotTaken);
+}
+
+void LogWriter::commit() {
+  flush(true);
+  if (mode_ == Mode::kWhole && ::rename(written_path_.c_str(), path_.c_str()) != 0) {
+    throw_log_error(path_, "cannot give the log its name");
+  }
+  ::close(fd_);
+  fd_ = -1;
+  const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
+  const int folder_fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder_fd >= 0) {
+    ::fsync(folder_fd);
+    ::close(folder_fd);
+  }
+}
+
+}  // namespace roadfix

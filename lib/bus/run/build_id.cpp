@@ -1,0 +1,8 @@
+#include "bus/run/build_id.h"
+
+namespace roadfix {
+
+// Weak: the generated build_id of a program takes its place.
+__attribute__((weak)) const char* build_id_text() { return "test"; }
+
+}  // namespace roadfix
