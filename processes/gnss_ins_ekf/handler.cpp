@@ -156,40 +156,30 @@ class GnssInsStage final : public Stage {
   PublishSlot pose_slot_, status_slot_;
 };
 
-template <class T>
-void take(const std::optional<T>& from, T& to) {
-  if (from) to = *from;
-}
-
 }  // namespace
 
 GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
   GnssInsVehicle v;
   v.position_latency_std = v.velocity_latency_std = kUnknownLatency;
   if (const auto& imu = calibration.sensors.imu) {
-    take(imu->gyro_noise, v.gyro_noise);
-    take(imu->accel_noise, v.accel_noise);
-    take(imu->gyro_bias_std, v.gyro_bias_std);
-    take(imu->accel_bias_std, v.accel_bias_std);
-    take(imu->scale_std, v.scale_std);
-    take(imu->correlation, v.correlation_s);
-    take(imu->time_offset_std, v.time_offset_std);
+    take_known_noise(*imu, v);
+    take_known(imu->time_offset_std, v.time_offset_std);
   }
   if (const auto& gnss = calibration.sensors.gnss) {
-    take(gnss->lever_arm, v.p_imu_antenna);
-    take(gnss->position_latency_std, v.position_latency_std);
+    take_known(gnss->lever_arm, v.p_imu_antenna);
+    take_known(gnss->position_latency_std, v.position_latency_std);
     // One receiver, one way through it, unless the calibration knows better.
     v.velocity_latency_std = gnss->velocity_latency_std.value_or(v.position_latency_std);
   }
   if (const auto& wheels = calibration.sensors.wheels) {
-    take(wheels->speed_scale_std, v.wheel_scale_std);
-    take(wheels->speed_noise, v.wheel_noise);
-    take(wheels->track_width, v.track_width);
+    take_known(wheels->speed_scale_std, v.wheel_scale_std);
+    take_known(wheels->speed_noise, v.wheel_noise);
+    take_known(wheels->track_width, v.track_width);
   }
   if (const auto& mag = calibration.sensors.mag) {
     if (mag->declination_deg) v.magnetic_declination = *mag->declination_deg * kDegree;
     if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;
-    take(mag->soft_iron, v.soft_iron);
+    take_known(mag->soft_iron, v.soft_iron);
   }
   if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
   return v;

@@ -29,11 +29,6 @@ constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transpor
 constexpr int64_t kImuTimeout_us = 200'000;
 constexpr double kUnknownAxle_m = 1.0;  // standard deviation of the rear axle from the imu, where nothing is said
 
-template <class T>
-void take(const std::optional<T>& from, T& to) {
-  if (from) to = *from;
-}
-
 int8_t pose_state(const MsckfOutput& out) {
   if (out.phase == MsckfPhase::kLost) return pose_t::STATE_LOST;
   if (out.phase == MsckfPhase::kStarting) return pose_t::STATE_ALIGNING;
@@ -62,24 +57,19 @@ MsckfVehicle msckf_vehicle(const Calibration& calibration) {
   v.T_imu_camera = rig.T_vehicle_left;
   if (rig.right) v.T_left_right = rig.T_right_left.inverse();
   if (const auto& imu = calibration.sensors.imu) {
-    take(imu->gyro_noise, v.gyro_noise);
-    take(imu->accel_noise, v.accel_noise);
-    take(imu->gyro_bias_std, v.gyro_bias_std);
-    take(imu->accel_bias_std, v.accel_bias_std);
-    take(imu->scale_std, v.scale_std);
-    take(imu->correlation, v.correlation_s);
+    take_known_noise(*imu, v);
   }
   const CameraCalibration& left = *calibration.sensors.camera_left;
-  take(left.time_offset, v.time_offset);
-  take(left.time_offset_std, v.time_offset_std);
-  take(left.stamp_jitter, v.stamp_jitter);
-  take(left.rate, v.camera_rate);
-  take(left.mounting->std, v.camera_std);
+  take_known(left.time_offset, v.time_offset);
+  take_known(left.time_offset_std, v.time_offset_std);
+  take_known(left.stamp_jitter, v.stamp_jitter);
+  take_known(left.rate, v.camera_rate);
+  take_known(left.mounting->std, v.camera_std);
   if (left.mounting->std_deg) v.camera_turn_std = *left.mounting->std_deg * kDegree;
   if (const auto& wheels = calibration.sensors.wheels) {
-    take(wheels->speed_scale_std, v.wheel_scale_std);
-    take(wheels->speed_noise, v.wheel_noise);
-    take(wheels->track_width, v.track_width);
+    take_known(wheels->speed_scale_std, v.wheel_scale_std);
+    take_known(wheels->speed_noise, v.wheel_noise);
+    take_known(wheels->track_width, v.track_width);
   }
   if (calibration.mounting && calibration.mounting->std_deg)
     v.mounting_std = calibration.mounting->std_deg->tail<2>().maxCoeff() * kDegree;

@@ -158,11 +158,6 @@ class WheelOdometryStage final : public Stage {
   std::deque<Ahead> ahead_;
 };
 
-template <class T>
-void take(const std::optional<T>& from, T& to) {
-  if (from) to = *from;
-}
-
 /// Random walk that a Gauss-Markov process is over times short against its correlation.
 void take_walk(const std::optional<double>& sigma, const std::optional<double>& correlation_s, double& walk) {
   if (sigma && correlation_s) walk = *sigma * std::sqrt(2.0 / *correlation_s);
@@ -173,22 +168,22 @@ void take_walk(const std::optional<double>& sigma, const std::optional<double>& 
 WheelSensors wheel_sensors(const Calibration& calibration) {
   WheelSensors s;
   if (const auto& imu = calibration.sensors.imu) {
-    take(imu->gyro_noise, s.gyro_noise);
-    take(imu->accel_noise, s.accel_noise);
-    take(imu->gyro_bias_std, s.gyro_bias_std);
-    take(imu->accel_bias_std, s.accel_bias_std);
-    take(imu->scale_std, s.gyro_scale_std);
+    take_known(imu->gyro_noise, s.gyro_noise);
+    take_known(imu->accel_noise, s.accel_noise);
+    take_known(imu->gyro_bias_std, s.gyro_bias_std);
+    take_known(imu->accel_bias_std, s.accel_bias_std);
+    take_known(imu->scale_std, s.gyro_scale_std);
     take_walk(imu->gyro_bias_std, imu->correlation, s.gyro_bias_walk);
     take_walk(imu->accel_bias_std, imu->correlation, s.accel_bias_walk);
   }
   if (const auto& wheels = calibration.sensors.wheels) {
-    take(wheels->speed_scale_std, s.wheel_scale_std);
-    take(wheels->speed_noise, s.wheel_noise);
+    take_known(wheels->speed_scale_std, s.wheel_scale_std);
+    take_known(wheels->speed_noise, s.wheel_noise);
     s.track_width = wheels->track_width;
   }
   if (const auto& mag = calibration.sensors.mag) {
-    take(mag->hard_iron, s.hard_iron_ut);
-    take(mag->soft_iron, s.soft_iron);
+    take_known(mag->hard_iron, s.hard_iron_ut);
+    take_known(mag->soft_iron, s.soft_iron);
   }
   if (calibration.mounting && calibration.mounting->std_deg) s.mounting_std = kDegree * *calibration.mounting->std_deg;
   return s;
