@@ -71,8 +71,10 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
   noise.segment<3>(kGyroBias).setConstant(gain * v.gyro_bias_std * v.gyro_bias_std);
   noise.segment<3>(kAccelBias).setConstant(gain * v.accel_bias_std * v.accel_bias_std);
   noise.segment<6>(kGyroScale).setConstant(gain * v.scale_std * v.scale_std);
-  noise(kWheelScale) = p.wheel_scale_walk * p.wheel_scale_walk * s.duration;
-  noise.segment<2>(kMounting).setConstant(p.mounting_walk * p.mounting_walk * s.duration);
+  // What the calibration calls exact stays put.
+  if (v.wheel_scale_std > 0.0) noise(kWheelScale) = p.wheel_scale_walk * p.wheel_scale_walk * s.duration;
+  for (int i = 0; i < 2; ++i)
+    if (v.mounting_std(1 + i) > 0.0) noise(kMounting + i) = p.mounting_walk * p.mounting_walk * s.duration;
   // The IMU's clock drifts against the receiver's; where the IMU defines time, the fixes do.
   const TimePriors time(v);
   const double walk = p.time_offset_walk * p.time_offset_walk * s.duration;

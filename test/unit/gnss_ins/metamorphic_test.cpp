@@ -165,3 +165,19 @@ TEST_CASE("the transition matrix is the derivative of the mechanisation") {
     }
   }
 }
+
+TEST_CASE("what the calibration calls exact stays put") {
+  const auto after_an_hour = [](double std) {
+    GnssInsConfig config;
+    config.vehicle.wheel_scale_std = std;
+    config.vehicle.mounting_std.setConstant(std);
+    TransitionSums sums;
+    sums.duration = 3600.0;
+    return Transition(sums, Eigen::Vector3d::Zero(), config).noise;
+  };
+  const ErrorVector exact = after_an_hour(0.0), about = after_an_hour(0.01);
+  for (const int state : {kWheelScale, kMounting, kMounting + 1}) {
+    CHECK(exact(state) == 0.0);
+    CHECK(about(state) > 1e-8);
+  }
+}
