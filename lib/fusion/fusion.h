@@ -89,8 +89,9 @@ class Fusion {
     FusionChannel channel = FusionChannel::kIns;
     bool metric = true;
     const Odometry* felt = nullptr;  ///< the channel's newest pose, for its velocities and attitude
-    double corrected = 0.0;  ///< m: the largest step by which the channel's pose differs from its velocities' motion
-    LevelView view;          ///< of that pose
+    LevelView view;                  ///< of that pose
+    /// What is left to make up when the newest sample will have been used; nothing: as at t_us().
+    std::optional<ReturnState> back;
   };
   struct Poses {
     Odometry fused;  ///< POSE_FUSED, enu
@@ -98,6 +99,9 @@ class Fusion {
   };
   /// The poses carried forward by that motion.
   [[nodiscard]] Poses carried(const Ahead& ahead) const;
+  /// The fused pose is the INS's newest, but for what is being made up.
+  [[nodiscard]] bool follows(const Ahead& ahead) const;
+  [[nodiscard]] const ReturnState& comeback() const { return comeback_; }
   [[nodiscard]] Odometry fused() const { return carried({}).fused; }
   [[nodiscard]] Odometry local() const { return carried({}).local; }
   [[nodiscard]] FusionReport report() const;
@@ -147,7 +151,6 @@ class Fusion {
     double turn = 0.0;
   };
 
-  [[nodiscard]] bool follows(const Ahead& ahead) const;
   [[nodiscard]] Forward forward(const Ahead& ahead) const;
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visitor);

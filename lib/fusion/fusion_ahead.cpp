@@ -46,10 +46,10 @@ Odometry full_pose(int64_t t_us, const Planar& pose, const Eigen::Matrix3d& P, d
 
 }  // namespace
 
-/// The fusion knows nothing that the INS does not know, and publishes its corrections as they are: so it would here.
+/// The fusion knows nothing that the INS does not know, and will take its corrections as they are.
 bool Fusion::follows(const Ahead& a) const {
   return placed_ && !foreign_ && config_.scheme == FusionScheme::kRelative && a.channel == FusionChannel::kIns &&
-         a.felt != nullptr && a.silent <= 0.0 && a.corrected <= config_.comeback.ignored && comeback_.residual.isZero();
+         a.felt != nullptr && a.silent <= 0.0;
 }
 
 /// (F.14), (F.15): the channel's motion less what is known of its errors, and its own noise.
@@ -124,8 +124,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
 Fusion::Poses Fusion::carried(const Ahead& a) const {
   const Forward f = forward(a);
   const FusionReport r = report();
-  ReturnState back = comeback_;
-  if (a.dt > 0.0) let_return(back, config_.comeback, a.dt);
+  const ReturnState& back = a.back ? *a.back : comeback_;
   const Odometry& attitude = a.felt != nullptr ? *a.felt : attitude_;
   const double grown = a.dt > 0.0 ? height_growth(a.way.head<2>().norm(), a.dt) : 0.0;
   const int64_t t_us = t_us_ + static_cast<int64_t>(std::llround(a.dt * 1e6));

@@ -29,7 +29,7 @@ void Outlook::see(const ChannelSample& s) {
     if (before->known && step.known && before->channel == step.channel && dt < kLongestGap) {
       const FeltMotion m = motion_by_velocity(before->view, step.view);
       step.way = after_motion(step.way, m.way);
-      step.corrected = (step.view.pose - after_motion(before->view.pose, m.way)).head<2>().norm();
+      step.correction = difference_of(step.view.pose, after_motion(before->view.pose, m.way));
       step.rise += m.rise;
     } else {
       step.silent += dt;
@@ -69,9 +69,24 @@ Fusion::Poses Outlook::poses(const Fusion& fusion) const {
   a.rise += newest.rise - first.rise;
   a.silent += newest.silent - first.silent;
   if (newest.known) a.felt = &newest.felt;
-  for (const Step& step : ahead_) a.corrected = std::max(a.corrected, step.corrected);
   a.view = newest.view;
+  a.back = returned(fusion, fusion.follows(a));
   return fusion.carried(a);
+}
+
+/// What the published pose will have to make up at the newest sample: as it goes back by then, and the corrections on
+/// the way as the fusion will take them. A jump is the fusion's alone, which counts it.
+ReturnState Outlook::returned(const Fusion& fusion, bool follows) const {
+  const ReturnConfig& config = fusion.config().comeback;
+  ReturnState back = fusion.comeback();
+  back.fixes_in_row = 0;
+  int64_t t_us = fusion.t_us();
+  for (const Step& step : ahead_) {
+    let_return(back, config, std::max(0.0, seconds_between(t_us, step.t_us)));
+    t_us = step.t_us;
+    if (follows) take_fix(back, config, step.correction, false);
+  }
+  return back;
 }
 
 template <class Self, class Visitor>

@@ -23,6 +23,7 @@ class Outlook {
   void load(StateReader& reader);
 
  private:
+  [[nodiscard]] ReturnState returned(const Fusion& fusion, bool follows) const;
   /// The way up to a sample, summed up from some sample on: differences alone count.
   struct Step {
     int64_t t_us = 0;
@@ -32,9 +33,9 @@ class Outlook {
     Odometry felt;
     LevelView view;  ///< of felt
     Planar way = Planar::Zero();
-    double rise = 0.0;       ///< m
-    double silent = 0.0;     ///< s in which nobody told the motion
-    double corrected = 0.0;  ///< m, by which the sample's place is not where the velocities lead
+    double rise = 0.0;                   ///< m
+    double silent = 0.0;                 ///< s in which nobody told the motion
+    Planar correction = Planar::Zero();  ///< by which the sample's pose is not where the velocities lead
   };
 
   template <class Self, class Visitor>

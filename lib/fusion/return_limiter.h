@@ -9,7 +9,7 @@
 namespace roadfix {
 
 struct ReturnConfig {
-  double rate = 0.75;       ///< m/s, at which the published pose returns
+  double rate = 2.0;        ///< m/s, at which the published pose returns: from `jump` off within a second
   double turn_rate = 0.05;  ///< rad/s
   double jump = 1.5;        ///< m: residuals above it wait for the fixes and then jump
   int fixes = 3;            ///< in a row

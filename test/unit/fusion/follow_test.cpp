@@ -14,6 +14,7 @@ using namespace fusion;
 
 namespace {
 
+using test::InsNoise;
 using test::planar_error;
 using test::run;
 using test::seconds;
@@ -102,6 +103,61 @@ TEST_CASE("an INS that comes back with a velocity it does not know is not carrie
   };
   CHECK(sigmas_off(kWrong) < 3.0);
   CHECK(sigmas_off(0.0) > 4.0);  // teeth
+}
+
+/// An INS alone whose pose is corrected by a metre at 60 s, as it is published 0.2 s ahead of the horizon.
+struct MadeUp {
+  double largest_step = 0.0;  ///< m, beyond the INS's own motion
+  double after_100ms = 0.0;   ///< m made up
+  double settled_s = 0.0;     ///< since the correction
+};
+MadeUp made_up(const ReturnConfig& config) {
+  const Tunnel t;
+  constexpr double kCorrected = 60.0, kOff = 1.0;  // s, m
+  InsNoise ins;
+  ins.fix_period = 1e3;  // no other fix
+  FusionConfig c;
+  c.comeback = config;
+  Fusion fusion(c);
+  Outlook outlook;
+  const std::vector<StreamEvent> events = ins_stream(t.drive, ins, 1);
+  std::size_t applied = 0;
+  double last = 0.0;
+  MadeUp m;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const auto sample = [&](std::size_t k) {
+      ChannelSample of = events[k].sample;
+      if (seconds(t.drive, of.odometry.t_us) >= kCorrected) of.odometry.T_frame_vehicle.p.x() += kOff;
+      return of;
+    };
+    const ChannelSample newest = sample(i);
+    outlook.see(newest);
+    for (; events[applied].sample.odometry.t_us + 200'000 <= newest.odometry.t_us; ++applied) {
+      outlook.drop_until(events[applied].sample.odometry.t_us);
+      (void)fusion.add(sample(applied));
+    }
+    const double s = seconds(t.drive, newest.odometry.t_us) - kCorrected;
+    if (s < -1.0 || s > 5.0) continue;
+    const Odometry fused = outlook.poses(fusion).fused;
+    REQUIRE(fused.t_us == newest.odometry.t_us);
+    const double off = (fused.T_frame_vehicle.p - events[i].sample.odometry.T_frame_vehicle.p).x();
+    m.largest_step = std::max(m.largest_step, std::abs(off - last));
+    if (s < 0.1001) m.after_100ms = off;
+    if (std::abs(off - kOff) > 1e-6) m.settled_s = s;
+    last = off;
+  }
+  return m;
+}
+
+TEST_CASE("a return begins with the fix, not when the horizon has come there, and keeps to its rate") {
+  ReturnConfig config;
+  const MadeUp even = made_up(config);
+  const double dt = 0.02;
+  CHECK(even.largest_step < 1.01 * config.rate * dt);
+  CHECK(even.after_100ms > 0.8 * config.rate * (0.1 - dt));
+  CHECK(even.settled_s < 1.0 / config.rate + 2.0 * dt);
+  config.ignored = 2.0;
+  CHECK(made_up(config).largest_step > 0.99);  // teeth: as it is
 }
 
 }  // namespace
