@@ -110,7 +110,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
   Memory& m = memory(s.channel);
   m.shares_imu = s.shares_imu;
   m.carried = false;
-  if (m.last && m.reset_counter != s.reset_counter) {
+  if (m.reset_counter != s.reset_counter) {  // also after poses that were none: another map is another witness
     m.last.reset();
     if (s.channel == FusionChannel::kVo) {
       agreement_ = AgreementState{};

@@ -13,7 +13,8 @@ constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 
 }  // namespace
 
-/// The tie follows the vision always, and learns from the fused pose while GNSS is there.
+/// The tie follows the vision always, and learns from the fused pose while GNSS is there. One that went with its map
+/// begins again at once, in an outage as well: as sure as the fused pose is, it can tell the vision where to restart.
 void Fusion::update_tie(const ChannelSample& s) {
   const SE3& T_vo_vehicle = s.odometry.T_frame_vehicle;
   Odometry here = fused();
@@ -24,7 +25,7 @@ void Fusion::update_tie(const ChannelSample& s) {
   cov.diagonal().head<3>().array() += kTieFloor * kTieFloor;
   const bool known = placed_ && gnss_ && agreement_.agrees;
   if (!tie_.valid()) {
-    if (!known) return;
+    if (!placed_) return;
     tie_.start(T_vo_vehicle, here.T_frame_vehicle, cov, config_.tie);
     last_tie_us_ = t_us_;
     return;

@@ -204,5 +204,71 @@ TEST_CASE("a gyro bias of the vision is learnt while GNSS is good") {
   CHECK(std::abs(closed.second - closed.first) > 0.5 * std::abs(drift));  // teeth
 }
 
+/// In the tunnel a vision drives off from 50 s, tells nothing from 52 s to 53 s, and goes on from there in a new map
+/// (`reset`) whose lengths are wrong by `scaled`; again nothing from 58 s to 59 s.
+struct NewMap {
+  int used = 0, refused = 0;     ///< pictures, in the five seconds of the map
+  double first_used_s = 99.0;    ///< since the map began
+  double largest = 0.0;          ///< m, of the fused pose in them
+  std::vector<double> asked_at;  ///< s: restarts
+  double restart_off = 0.0;      ///< m, the last of them, in the frame of the new map
+};
+NewMap new_map(bool reset, double scaled) {
+  Tunnel t;
+  t.ins.velocity_walk = 0.005;  // an INS with wheels
+  t.with_wheels = false;
+  t.vo.fault = [&](double s, Planar& motion) {
+    if (s > 50.0 && s < 52.05) motion.y() += 0.3;
+    if (s > 53.05) motion.head<2>() *= scaled;
+    return true;
+  };
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    if (e.sample.channel != FusionChannel::kVo || s < 52.05) continue;
+    if (s < 52.95 || (s > 57.95 && s < 58.95)) e.sample.odometry.validity = Validity::kInvalid;
+    if (reset) e.sample.reset_counter = s < 58.95 ? 1 : 2;
+  }
+  Fusion fusion({});
+  Watch watch{t.drive, 52.95, 57.95};
+  NewMap m;
+  std::optional<SE3> T_vo_vehicle;  // newest of the map
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    watch(f, e);
+    if (const auto restart = fusion.take_restart()) {
+      m.asked_at.push_back(s);
+      if (T_vo_vehicle) m.restart_off = (restart->T_vo_vehicle.p - T_vo_vehicle->p).head<2>().norm();
+    }
+    if (e.sample.channel != FusionChannel::kVo || s < 52.95 || s > 57.95) return;
+    T_vo_vehicle = e.sample.odometry.T_frame_vehicle;
+    const FuseStatus status = f.channel(FusionChannel::kVo).status;
+    if (status == FuseStatus::kGated) ++m.refused;
+    if (status != FuseStatus::kAccepted) return;
+    if (m.used++ == 0) m.first_used_s = s - 53.0;
+  });
+  m.largest = watch.largest;
+  return m;
+}
+
+TEST_CASE("a new map is another witness: it is heard from its second pose on, and refused if it does not fit") {
+  const NewMap fits = new_map(true, 1.0), wrong = new_map(true, 1.5), same = new_map(false, 1.0);
+  CHECK(fits.first_used_s < 0.15);
+  CHECK(fits.refused <= 1);
+  CHECK(fits.used >= 48);
+  CHECK(wrong.used == 0);
+  CHECK(wrong.refused > 45);
+  CHECK(wrong.largest < 2.0);
+  CHECK(same.first_used_s > 0.9);  // one that contradicted has to fit for a second
+}
+
+TEST_CASE("a vision that is lost twice in a tunnel is told twice where to start again") {
+  const NewMap m = new_map(true, 1.0);
+  REQUIRE(!m.asked_at.empty());
+  CHECK(m.asked_at.back() > 57.9);
+  CHECK(m.asked_at.back() < 58.2);
+  CHECK(m.restart_off < 5.0);  // by where the car has come within the picture or two since
+}
+
 }  // namespace
 }  // namespace roadfix
