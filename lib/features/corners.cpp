@@ -82,9 +82,10 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
 
   std::vector<cv::KeyPoint> found;
   cv::FAST(gray, found, config.fast_threshold, true);
-  std::sort(found.begin(), found.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  const auto before = [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
     return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
-  });
+  };
+  if (!std::is_sorted(found.begin(), found.end(), before)) std::sort(found.begin(), found.end(), before);
 
   // A grid whose cells would hold about one corner each when all are found.
   const auto expected = static_cast<double>(taken.size()) + static_cast<double>(config.max_corners);

@@ -40,6 +40,7 @@ bool KltTracks::renew(Track& track, const cv::Mat& gray, int window_px) {
   auto fresh = cut_patch(gray, track.feature.pixel, window_px);
   if (!fresh) return false;
   track.patch = std::move(*fresh);
+  track.model = {};
   track.place = {track.feature.pixel - track.patch.offset};
   return true;
 }
@@ -56,7 +57,8 @@ bool KltTracks::find(Track& track, const Eigen::Vector2f& expected, const FlowPy
     Placement start;
     start.shape = track.place.shape;
     start.centre = near - start.shape * track.patch.offset;
-    return place_patch(track.patch, gray, start, config);
+    return config.shape_std > 0.0 ? place_patch(track.patch, track.model, gray, start, config)
+                                  : place_patch(track.patch, gray, start, config);
   };
   config.reach_px = kNear_px;
   auto place = look(expected);
@@ -137,7 +139,7 @@ std::vector<Feature> KltTracks::replenish() {
     auto patch = cut_patch(pyramid_.picture(), corner.pixel, config_.klt_window_px);
     if (!patch) continue;
     fresh.push_back({next_track_++, corner.pixel});
-    live_.push_back({fresh.back(), std::move(*patch), {corner.pixel}});
+    live_.push_back({.feature = fresh.back(), .patch = std::move(*patch), .place = {corner.pixel}});
   }
   return fresh;
 }

@@ -27,7 +27,8 @@ class KltTracks final : public FrontEnd {
   struct Track {
     Feature feature;  ///< where it is in the last picture
     Patch patch;
-    Placement place;  ///< of the patch in the last picture
+    Placement place;        ///< of the patch in the last picture
+    PatchModel<6> model{};  ///< of the patch; made again after a load
   };
   [[nodiscard]] PatchConfig patch_config() const;
   /// Moves the track to where the new picture shows it, near `expected`; false where it is not found.

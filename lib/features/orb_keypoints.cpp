@@ -1,4 +1,5 @@
 /// ORB keypoints, and the distances of descriptors.
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -17,16 +18,28 @@ constexpr int kHalf = kPatch / 2;
 constexpr int kBorder = 19;      ///< what the turned pattern reaches over, px of a level
 constexpr double kPerTrack = 3;  ///< keypoints for one track: what is matched against must be richer than the tracks
 
+/// Half the width of a disc of radius kHalf, by the distance of the row from its middle.
+constexpr std::array<int, kHalf + 1> kReach = [] {
+  std::array<int, kHalf + 1> reach{};
+  for (int dy = 0; dy <= kHalf; ++dy) {
+    while ((reach[static_cast<size_t>(dy)] + 1) * (reach[static_cast<size_t>(dy)] + 1) + dy * dy <= kHalf * kHalf)
+      ++reach[static_cast<size_t>(dy)];
+  }
+  return reach;
+}();
+
 /// Direction from a corner to the centroid of the intensities around it, degrees. Sums are integers.
 float centroid_angle(const cv::Mat& gray, int u, int v) {
-  int64_t mx = 0, my = 0;
+  int32_t mx = 0, my = 0;  // at most 709 pixels of 255, 15 away
   for (int dy = -kHalf; dy <= kHalf; ++dy) {
-    const uint8_t* line = gray.ptr<uint8_t>(v + dy);
-    const int reach = static_cast<int>(std::sqrt(static_cast<double>(kHalf * kHalf - dy * dy)));
+    const uint8_t* line = gray.ptr<uint8_t>(v + dy) + u;
+    const int reach = kReach[static_cast<size_t>(std::abs(dy))];
+    int32_t sum = 0;
     for (int dx = -reach; dx <= reach; ++dx) {
-      mx += dx * line[u + dx];
-      my += dy * line[u + dx];
+      mx += dx * line[dx];
+      sum += line[dx];
     }
+    my += dy * sum;
   }
   return cv::fastAtan2(static_cast<float>(my), static_cast<float>(mx));
 }

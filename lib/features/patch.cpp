@@ -26,83 +26,76 @@ using Vector = Eigen::Matrix<float, N, 1>;
 template <int N>
 using Square = Eigen::Matrix<float, N, N>;
 
-Eigen::Map<const Lanes> lanes(const Pixels& pixels, int i) { return Eigen::Map<const Lanes>(pixels.data() + i); }
-Eigen::Map<Lanes> lanes(Pixels& pixels, int i) { return Eigen::Map<Lanes>(pixels.data() + i); }
+Eigen::Map<const Lanes> lanes(const float* pixels) { return Eigen::Map<const Lanes>(pixels); }
 
 float total(const Lanes& x) { return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])); }
 
-float dot(const Pixels& a, const Pixels& b, int n) {
+float dot(const float* a, const float* b, int n) {
   Lanes sum = Lanes::Zero();
-  for (int i = 0; i < n; i += kLanes) sum += lanes(a, i) * lanes(b, i);
+  for (int i = 0; i < n; i += kLanes) sum += lanes(a + i) * lanes(b + i);
   return total(sum);
 }
 
-float sum_of(const Pixels& a, int n) {
+float sum_of(const float* a, int n) {
   Lanes sum = Lanes::Zero();
-  for (int i = 0; i < n; i += kLanes) sum += lanes(a, i);
+  for (int i = 0; i < n; i += kLanes) sum += lanes(a + i);
   return total(sum);
 }
 
-/// The patch without its mean, its derivatives by place (and shape, in pixels at the patch's edge) with mean and grey
-/// pattern projected out, and what follows from them. Pixels beyond the last are zero.
-template <int N>
-struct Model {
-  int side = 0, count = 0, padded = 0;
-  Pixels value;
-  std::array<Pixels, N> slope;
-  float energy = 0.0F;
-  Square<N> inverse;  ///< of Gauss-Newton's matrix with the prior
-};
+int padded(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
-template <int N>
-void centre(Pixels& pixels, const Model<N>& m) {
-  const float mean = sum_of(pixels, m.padded) / static_cast<float>(m.count);
-  for (int i = 0; i < m.count; ++i) pixels[static_cast<size_t>(i)] -= mean;
+void centre(float* pixels, int count) {
+  const float mean = sum_of(pixels, padded(count)) / static_cast<float>(count);
+  for (int i = 0; i < count; ++i) pixels[i] -= mean;
 }
 
-/// False where the patch is too flat.
+/// Grey levels, and their derivatives by place (and shape, in pixels at the patch's edge). Pixels beyond the last are
+/// zero.
 template <int N>
-bool prepare(const Patch& patch, int side, float prior, Model<N>& m) {
-  m.side = side;
-  m.count = side * side;
-  m.padded = (m.count + kLanes - 1) / kLanes * kLanes;
-  const auto blank = [&m](Pixels& pixels) { std::fill(pixels.begin() + m.count, pixels.begin() + m.padded, 0.0F); };
-  blank(m.value);
-  for (Pixels& slope : m.slope) blank(slope);
-  const int stride = side + 2, half = side / 2;
+void read_pixels(const Patch& patch, int side, PatchModel<N>& m) {
+  const int n = padded(m.count), stride = side + 2, half = side / 2;
+  m.pixels.assign(static_cast<size_t>((N + 1) * n), 0.0F);
   const float edge = 1.0F / static_cast<float>(std::max(1, half));
-  size_t i = 0;
+  float* out = m.pixels.data();
   for (int row = 0; row < side; ++row) {
     const uint8_t* line = patch.grey.data() + static_cast<ptrdiff_t>(row + 1) * stride + 1;
     const float y = static_cast<float>(row - half) * edge;
-    for (int column = 0; column < side; ++column, ++i) {
+    for (int column = 0; column < side; ++column, ++out) {
       const float x = static_cast<float>(column - half) * edge;
       const float gx = 0.5F * static_cast<float>(line[column + 1] - line[column - 1]);
       const float gy = 0.5F * static_cast<float>(line[column + stride] - line[column - stride]);
-      m.value[i] = static_cast<float>(line[column]);
-      m.slope[0][i] = gx;
-      m.slope[1][i] = gy;
+      out[0] = static_cast<float>(line[column]);
+      out[n] = gx;
+      out[2 * n] = gy;
       if constexpr (N == 6) {
-        m.slope[2][i] = gx * x;
-        m.slope[3][i] = gx * y;
-        m.slope[4][i] = gy * x;
-        m.slope[5][i] = gy * y;
+        out[3 * n] = gx * x;
+        out[4 * n] = gx * y;
+        out[5 * n] = gy * x;
+        out[6 * n] = gy * y;
       }
     }
   }
-  centre(m.value, m);
-  m.energy = dot(m.value, m.value, m.padded);
+}
+
+/// Takes mean and grey pattern out of the derivatives. False where the patch is too flat.
+template <int N>
+bool prepare(const Patch& patch, int side, float prior, PatchModel<N>& m) {
+  m.count = side * side;
+  read_pixels(patch, side, m);
+  const int n = padded(m.count);
+  float* value = m.pixels.data();
+  const auto slope = [value, n](int k) { return value + static_cast<ptrdiff_t>(k + 1) * n; };
+  centre(value, m.count);
+  m.energy = dot(value, value, n);
   if (!(m.energy > 0.0F)) return false;
-  for (Pixels& slope : m.slope) {
-    centre(slope, m);
-    const float share = dot(slope, m.value, m.padded) / m.energy;
-    for (int k = 0; k < m.padded; k += kLanes) lanes(slope, k) -= share * lanes(m.value, k);
+  for (int a = 0; a < N; ++a) {
+    centre(slope(a), m.count);
+    const float share = dot(slope(a), value, n) / m.energy;
+    for (int k = 0; k < n; k += kLanes) Eigen::Map<Lanes>(slope(a) + k) -= share * lanes(value + k);
   }
   Square<N> H;
   for (int a = 0; a < N; ++a) {
-    for (int b = 0; b <= a; ++b) {
-      H(a, b) = H(b, a) = dot(m.slope[static_cast<size_t>(a)], m.slope[static_cast<size_t>(b)], m.padded);
-    }
+    for (int b = 0; b <= a; ++b) H(a, b) = H(b, a) = dot(slope(a), slope(b), n);
     if (a >= 2) H(a, a) += prior;
   }
   const Eigen::LDLT<Square<N>> factors(H);
@@ -116,9 +109,12 @@ bool prepare(const Patch& patch, int side, float prior, Model<N>& m) {
 struct Grid {
   explicit Grid(int side) : count(static_cast<size_t>(side) * static_cast<size_t>(side)) {
     const int half = side / 2;
-    for (int i = 0; i < side * side; ++i) {
-      x[static_cast<size_t>(i)] = static_cast<float>(i % side - half);
-      y[static_cast<size_t>(i)] = static_cast<float>(i / side - half);
+    size_t i = 0;
+    for (int row = -half; row <= half; ++row) {
+      for (int column = -half; column <= half; ++column, ++i) {
+        x[i] = static_cast<float>(column);
+        y[i] = static_cast<float>(row);
+      }
     }
   }
   size_t count;
@@ -180,32 +176,35 @@ class Stretch {
 };
 
 template <int N>
-std::optional<Placement> place(const Patch& patch, const cv::Mat& gray, const Placement& start,
+std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::Mat& gray, const Placement& start,
                                const PatchConfig& config) {
   const int side = config.window_px;
   const auto half = static_cast<float>(side / 2);
   const float reach = config.reach_px > 0.0F ? config.reach_px : 2.0F * half;
   const float edge_std = half * static_cast<float>(config.shape_std);
   const float prior = N == 6 ? kGreyNoise * kGreyNoise / (edge_std * edge_std) : 0.0F;
-  Model<N> m;
-  if (!prepare(patch, side, prior, m)) return std::nullopt;
+  if (m.count == 0) m.flat = !prepare(patch, side, prior, m);
+  if (m.flat) return std::nullopt;
+  const int n = padded(m.count);
+  const float* value = m.pixels.data();
   const Grid grid(side);
   const Eigen::Matrix2f start_inverse = start.shape.inverse();
   const auto min_correlation = static_cast<float>(config.min_correlation);
   Placement now = start;
   Stretch<N> stretch;
-  Pixels seen;
-  std::fill(seen.begin() + m.count, seen.begin() + m.padded, 0.0F);
+  Pixels pixels;
+  const float* seen = pixels.data();
+  std::fill(pixels.begin() + m.count, pixels.begin() + n, 0.0F);
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    if (!sample(gray, now, side, grid, seen)) return std::nullopt;
-    const float mean = sum_of(seen, m.padded) / static_cast<float>(m.count);
-    const float spread = dot(seen, seen, m.padded) - mean * mean * static_cast<float>(m.count);
+    if (!sample(gray, now, side, grid, pixels)) return std::nullopt;
+    const float mean = sum_of(seen, n) / static_cast<float>(m.count);
+    const float spread = dot(seen, seen, n) - mean * mean * static_cast<float>(m.count);
     const float gain = std::sqrt(spread / m.energy);  // also where the patches do not match yet
     if (!(gain > kMinGain && gain < kMaxGain)) return std::nullopt;
-    now.correlation = dot(m.value, seen, m.padded) / (gain * m.energy);
+    now.correlation = dot(value, seen, n) / (gain * m.energy);
     if (iteration >= kHopelessAfter && now.correlation < kHopeless * min_correlation) return std::nullopt;
     Vector<N> b;
-    for (int k = 0; k < N; ++k) b[k] = dot(m.slope[static_cast<size_t>(k)], seen, m.padded) / gain;
+    for (int k = 0; k < N; ++k) b[k] = dot(value + static_cast<ptrdiff_t>(k + 1) * n, seen, n) / gain;
     if constexpr (N == 6) {
       const Eigen::Matrix2f off = start_inverse * now.shape - Eigen::Matrix2f::Identity();
       b.template tail<4>() += prior * half * Vector<4>(off(0, 0), off(0, 1), off(1, 0), off(1, 1));
@@ -244,7 +243,14 @@ std::optional<Patch> cut_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel
 
 std::optional<Placement> place_patch(const Patch& patch, const cv::Mat& gray, const Placement& start,
                                      const PatchConfig& config) {
-  return config.shape_std > 0.0 ? place<6>(patch, gray, start, config) : place<2>(patch, gray, start, config);
+  PatchModel<2> rigid;
+  PatchModel<6> model;
+  return config.shape_std > 0.0 ? place(patch, model, gray, start, config) : place(patch, rigid, gray, start, config);
+}
+
+std::optional<Placement> place_patch(const Patch& patch, PatchModel<6>& model, const cv::Mat& gray,
+                                     const Placement& start, const PatchConfig& config) {
+  return place(patch, model, gray, start, config);
 }
 
 }  // namespace roadfix

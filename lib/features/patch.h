@@ -39,11 +39,25 @@ struct Placement {
   [[nodiscard]] Eigen::Vector2f point(const Patch& patch) const { return centre + shape * patch.offset; }
 };
 
+/// What placing a patch needs of the patch alone, with N unknowns: the place, or the place and the shape.
+template <int N>
+struct PatchModel {
+  int count = 0;              ///< pixels; zero: not made yet
+  bool flat = false;          ///< too flat to be placed
+  std::vector<float> pixels;  ///< the patch without its mean, then its N derivatives; each padded with zeros
+  float energy = 0.0F;        ///< squared sum of the first
+  Eigen::Matrix<float, N, N> inverse = Eigen::Matrix<float, N, N>::Zero();  ///< of Gauss-Newton's matrix with the prior
+};
+
 /// Nothing where the window does not lie within the picture.
 std::optional<Patch> cut_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel, int window_px);
 
 /// Nothing where the patch is too flat, leaves the picture or is not found alike.
 std::optional<Placement> place_patch(const Patch& patch, const cv::Mat& gray, const Placement& start,
                                      const PatchConfig& config);
+/// The same with the shape looked for; `model` is made at the first call and serves as long as patch and configuration
+/// (but for its reach) stay.
+std::optional<Placement> place_patch(const Patch& patch, PatchModel<6>& model, const cv::Mat& gray,
+                                     const Placement& start, const PatchConfig& config);
 
 }  // namespace roadfix
