@@ -1,68 +1,16 @@
-/// The tracker on the scenarios, by tracks without pixels: where it must hold, where it must say that it is lost, and
-/// whether it finds its place again.
+/// The tracker on the scenarios, by tracks without pixels: where it must hold and where it must say that it is lost.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <fstream>
-#include <opencv2/imgproc.hpp>
-#include <random>
 
-#include "geometry/determinism.h"
-#include "simulation/scenarios.h"
-#include "slam/keyframe_tracker.h"
-#include "support/simulated_tracks.h"
-#include "support/track_drive.h"
+#include "fed_tracker.h"
 
 namespace roadfix {
 namespace {
 
-/// A tracker whose front end and right eye are fed by hand.
-class FedTracker {
- public:
-  FedTracker(const KeyframeTrackerConfig& config, const ScenarioConfig& scenario)
-      : picture_(scenario.camera.height_px, scenario.camera.width_px, CV_8UC1) {
-    fix_eigen_blocking();
-    for (int i = 0; i < static_cast<int>(picture_.total()); ++i) picture_.data[i] = static_cast<uint8_t>(i % 2 * 64);
-    CameraRig rig;
-    rig.left = intrinsics_of(scenario.camera);
-    rig.right = rig.left;
-    rig.T_vehicle_left = nominal_T_vehicle_left(scenario.camera);
-    rig.T_right_left = T_left_right(scenario.camera).inverse();
-    tracker_ = std::make_unique<KeyframeTracker>(config, rig, std::make_unique<test::SimulatedFrontEnd>(seen_),
-                                                 executor_, std::make_unique<test::SimulatedRightEye>(seen_));
-  }
-
-  const TrackedFrame& process(int64_t t_us, const std::vector<TrackObservation>& tracks) {
-    seen_->now.clear();
-    for (const TrackObservation& o : tracks) seen_->now.emplace(o.id, o);
-    return tracker_->process({t_us, picture_, picture_});
-  }
-
-  KeyframeTracker& operator*() { return *tracker_; }
-  KeyframeTracker* operator->() { return tracker_.get(); }
-  cv::Mat& picture() { return picture_; }
-
- private:
-  std::shared_ptr<test::SeenTracks> seen_ = std::make_shared<test::SeenTracks>();
-  InlineExecutor executor_;
-  cv::Mat picture_;
-  std::unique_ptr<KeyframeTracker> tracker_;
-};
-
-KeyframeTrackerConfig exact_lens() {
-  KeyframeTrackerConfig config;
-  config.focal_std = config.radial_std = config.right_turn_std_deg = 0.0;
-  config.close_loops = false;
-  return config;
-}
-
-ScenarioConfig shortened(const std::string& name, double duration_s) {
-  ScenarioConfig config = scenario(name);
-  config.duration_s = std::min(config.duration_s, duration_s);
-  config.camera.layout = CameraLayout::kStereo;
-  config.gnss.rate_hz = 0.0;
-  config.faults.clear();
-  return config;
-}
+using test::exact_lens;
+using test::FedTracker;
+using test::shortened;
 
 struct Course {
   int frames = 0, tracked = 0;
@@ -277,117 +225,6 @@ TEST_CASE("half an hour keeps memory bounded", "[statistics]") {
   CHECK(valid > 0.99 * frames);
   CHECK(10 * states.back() < 12 * *std::max_element(states.begin(), states.begin() + 3));
   CHECK(static_cast<double>(residents.back()) < static_cast<double>(residents[1]) + 10e6);
-}
-
-/// Points along a drive, each with a patch of its own that a made-up picture shows where the point is seen.
-class PaintedWorld {
- public:
-  PaintedWorld(const SimulatedDrive& drive, double until_s) {
-    std::mt19937 random(11);
-    std::uniform_real_distribution<double> unit(0.0, 1.0);
-    std::optional<Eigen::Vector3d> last;
-    for (double t = 0.0; t < until_s; t += 0.1) {
-      const SE3 T = drive.truth_at(drive.config.start_utime + static_cast<int64_t>(1e6 * t)).T_frame_vehicle;
-      if (last && (T.p - *last).norm() < 1.0) continue;
-      last = T.p;
-      for (int i = 0; i < 6; ++i) {
-        const double side = unit(random) < 0.5 ? -1.0 : 1.0;
-        points_.emplace_back(T * Eigen::Vector3d(unit(random), side * (4.0 + 16.0 * unit(random)), 6.0 * unit(random)));
-        cv::Mat& patch = patches_.emplace_back(kPatch, kPatch, CV_8UC1);
-        for (int k = 0; k < kPatch * kPatch; ++k) patch.data[k] = static_cast<uint8_t>(random() & 0xFFU);
-        cv::resize(patch.rowRange(0, kPatch / 4).colRange(0, kPatch / 4).clone(), patch, patch.size());
-      }
-    }
-    seen_last_.assign(points_.size(), -2);
-    visit_.assign(points_.size(), 0);
-  }
-
-  /// What the rig sees, and paints it. A point that comes back into view is a new track.
-  std::vector<TrackObservation> observe(const SE3& T_enu_left, const SE3& T_right_left, const Camera& camera,
-                                        double noise_px, int frame, cv::Mat& picture) {
-    picture.setTo(100);
-    std::mt19937 random(static_cast<unsigned>(1000 + frame));
-    std::normal_distribution<double> noise(0.0, noise_px);
-    const SE3 T_left_enu = T_enu_left.inverse();
-    std::vector<TrackObservation> all;
-    for (size_t i = 0; i < points_.size(); ++i) {
-      const Eigen::Vector3d p = T_left_enu * points_[i];
-      if (p.z() < 4.0 || p.z() > 45.0) continue;
-      const auto left = camera.project(p), right = camera.project(T_right_left * p);
-      if (!left || !right || !camera.sees(*left, 20.0) || !camera.sees(*right)) continue;
-      if (seen_last_[i] < frame - 1) ++visit_[i];
-      seen_last_[i] = frame;
-      TrackObservation o{};
-      o.p_enu = points_[i];
-      o.id = visit_[i] * 1'000'000 + static_cast<int64_t>(i);
-      o.left = *left + Eigen::Vector2d(noise(random), noise(random));
-      o.right = *right + Eigen::Vector2d(noise(random), noise(random));
-      const int u = static_cast<int>(std::lround(left->x())), v = static_cast<int>(std::lround(left->y()));
-      patches_[i].copyTo(picture(cv::Rect(u - kPatch / 2, v - kPatch / 2, kPatch, kPatch)));
-      all.push_back(o);
-    }
-    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
-    return all;
-  }
-
- private:
-  static constexpr int kPatch = 33;
-  std::vector<Eigen::Vector3d> points_;
-  std::vector<cv::Mat> patches_;
-  std::vector<int> seen_last_;
-  std::vector<int64_t> visit_;
-};
-
-struct TwoLaps {
-  int loops = 0, frames = 0, tracked = 0, jumps = 0;
-  double path = 0.0;
-  double worst_closed = 0.0, worst_open = 0.0;  ///< m, on the second lap
-};
-
-TwoLaps two_laps(bool close_loops) {
-  ScenarioConfig config = shortened("city_loop", 240.0);
-  const SimulatedDrive drive = simulate(config, 1);
-  KeyframeTrackerConfig tuned = exact_lens();
-  tuned.close_loops = close_loops;
-  FedTracker tracker(tuned, config);
-  PaintedWorld world(drive, config.duration_s);
-  const Camera camera(intrinsics_of(config.camera));
-  const SE3 T_vehicle_left = nominal_T_vehicle_left(config.camera),
-            T_right_left = T_left_right(config.camera).inverse();
-  TwoLaps laps;
-  std::optional<SE3> T_local_enu;
-  std::optional<Eigen::Vector3d> before;
-  const double half_s = 0.5 * config.duration_s;
-  for (int i = 0; 0.2 * i < config.duration_s - 1.0; ++i) {
-    const int64_t t_us = config.start_utime + 200'000 * i;
-    const SE3 truth = drive.truth_at(t_us).T_frame_vehicle;
-    const auto tracks = world.observe(truth * T_vehicle_left, T_right_left, camera, 0.4, i, tracker.picture());
-    const TrackedFrame& out = tracker.process(t_us, tracks);
-    if (before) laps.path += (truth.p - *before).norm();
-    before = truth.p;
-    ++laps.frames;
-    laps.jumps = out.reset_counter;
-    if (out.odometry.validity != Validity::kValid) continue;
-    ++laps.tracked;
-    if (!T_local_enu) T_local_enu = out.odometry.T_frame_vehicle * truth.inverse();
-    if (0.2 * i < half_s) continue;
-    const Eigen::Vector3d p = (*T_local_enu * truth).p;
-    laps.worst_open = std::max(laps.worst_open, (out.odometry.T_frame_vehicle.p - p).norm());
-    laps.worst_closed = std::max(laps.worst_closed, (tracker->closed(out.odometry).T_frame_vehicle.p - p).norm());
-  }
-  laps.loops = tracker->last().num_loops;
-  return laps;
-}
-
-TEST_CASE("city_loop closes its loop, and the second lap's error is below 0.3 % of the path", "[statistics]") {
-  const TwoLaps laps = two_laps(true);
-  std::printf(
-      "city_loop: tracked %d/%d, %d jumps, %d loops, path %.0f m, second lap's worst error %.2f m closed, %.2f m "
-      "open\n",
-      laps.tracked, laps.frames, laps.jumps, laps.loops, laps.path, laps.worst_closed, laps.worst_open);
-  CHECK(laps.loops >= 5);
-  CHECK(laps.worst_closed < 0.003 * laps.path);
-  CHECK(laps.tracked == laps.frames);
 }
 
 }  // namespace
