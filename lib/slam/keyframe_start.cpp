@@ -49,7 +49,6 @@ void KeyframeTracker::begin_map(int64_t t_us) {
   out_.state = found_back_ ? TrackState::kRelocalised : TrackState::kGood;
   out_.reason = found_back_ ? "found back at a place seen before" : "";
   found_back_ = false;
-  out_.num_inliers = landmarks_at_keyframe_;
   accept(t_us, map_.last().T_map_camera, Matrix6d::Zero());
   motion_.reset();
 }
@@ -68,7 +67,10 @@ void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Fe
   start_ = Start{};
   start_->t_us = frame.t_us;
   std::vector<Feature> all = features;
-  for (const Feature& f : front_end_->replenish()) all.push_back(f);
+  for (const Feature& f : front_end_->replenish()) {
+    all.push_back(f);
+    out_.features.push_back({f, FeatureUse::kNew});
+  }
   for (const Feature& f : all) {
     if (const auto normalised = left_.unproject(f.pixel.cast<double>())) start_->seen[f.track] = *normalised;
   }
@@ -87,6 +89,7 @@ void KeyframeTracker::start_mono(const CameraFrame& frame) {
   Pairs pairs;
   std::vector<double> flow;
   for (const Feature& f : features) {
+    out_.features.push_back({f, FeatureUse::kMatched});
     const auto normalised = left_.unproject(f.pixel.cast<double>());
     if (!start_ || !start_->seen.contains(f.track) || !normalised) continue;
     pairs.tracks.push_back(f.track);
@@ -131,7 +134,10 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   }
   std::vector<KeyframeFeature> first, second;
   std::vector<int64_t> wrong;
+  auto used = out_.features.begin();  // in the order of the pairs
   for (size_t i = 0; i < pairs.tracks.size(); ++i) {
+    while (used->feature.track != pairs.tracks[i]) ++used;
+    used->use = motion->inlier[i] ? FeatureUse::kInlier : FeatureUse::kOutlier;
     if (motion->inlier[i]) {
       first.push_back({pairs.tracks[i], pairs.first[i], {}});
       second.push_back({pairs.tracks[i], pairs.second[i], {}});
@@ -144,7 +150,8 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   map_.add_keyframe({0, frame.t_us, T_map_second, baseline}, second);
   front_end_->drop(wrong);
   landmarks_at_keyframe_ = count_landmarks(second);
-  out_.num_landmarks_seen = landmarks_at_keyframe_;
+  out_.num_landmarks_seen = static_cast<int>(pairs.tracks.size());
+  out_.num_inliers = static_cast<int>(first.size());
   begin_bundle();
   finish_bundle();
   start_.reset();

@@ -56,8 +56,8 @@ struct TrackedFrame {
   std::vector<UsedFeature> features;
   int num_expected = 0;  ///< tracks looked for
   int num_matches = 0;   ///< tracks found again
-  int num_inliers = 0;   ///< of the landmarks among them, those that agree with the pose
-  int num_landmarks_seen = 0;
+  int num_landmarks_seen = 0;  ///< of these, whose points are known: only they can be judged
+  int num_inliers = 0;         ///< of these, that agree with the pose
   double rms_px = 0.0;
   double brightness = 0.0;  ///< mean grey level
   int64_t num_keyframes = 0;

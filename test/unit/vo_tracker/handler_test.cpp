@@ -7,97 +7,15 @@
 #include <roadfix/vo_features_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
-#include <roadfix/wheels_t.hpp>
 
 #include "config/config.h"
-#include "geometry/determinism.h"
 #include "geometry/so3.h"
-#include "streams.h"
+#include "small_street.h"
 
 namespace roadfix {
 namespace {
 
 using namespace test;
-
-constexpr int kWidth = 480, kHeight = 160, kFrames = 100;
-constexpr double kFocal = 280.0, kBaseline = 0.5, kStep = 0.8;  // m a frame
-constexpr int64_t kFrame_us = 100'000;
-
-const CameraIntrinsics kLens{kWidth, kHeight, kFocal, kFocal, 240.0, 80.0, Distortion::kNone, {}};
-
-/// A camera that looks along the vehicle's x, 1.2 m ahead of its origin.
-CameraMounting mounting(double y) { return {{1.2, y, 1.0}, {0.5, -0.5, 0.5, -0.5}, {}, {}}; }
-
-Calibration calibration(bool stereo) {
-  Calibration c;
-  c.body_origin = BodyOrigin::kRearAxle;
-  CameraCalibration camera;
-  camera.width_px = kWidth;
-  camera.height_px = kHeight;
-  camera.intrinsics_px = Eigen::Vector4d(kFocal, kFocal, kLens.cx, kLens.cy);
-  camera.mounting = mounting(0.0);
-  c.sensors.camera_left = camera;
-  if (stereo) {
-    camera.mounting = mounting(-kBaseline);
-    c.sensors.camera_right = camera;
-  }
-  return c;
-}
-
-/// Straight on for 60 frames, then standing.
-double travelled(int frame) { return kStep * std::min(frame, 60); }
-
-const std::vector<Sent>& pictures() {
-  static const std::vector<Sent> kPictures = [] {
-    fix_eigen_blocking();
-    std::vector<Sent> all;
-    const test::Street street(3);
-    for (int i = 0; i < kFrames; ++i) {
-      const int64_t t = kFrame_us * (i + 1);
-      const auto seed = static_cast<unsigned>(2 * i + 1);
-      const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, travelled(i)}};
-      const SE3 right{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, travelled(i)}};
-      all.push_back(sent("CAMERA_LEFT", t, i, picture_message(street.picture(left, kLens, 2.0, seed))));
-      all.push_back(sent("CAMERA_RIGHT", t, i, picture_message(street.picture(right, kLens, 2.0, seed + 1))));
-    }
-    return all;
-  }();
-  return kPictures;
-}
-
-/// Wheel speeds at 50 Hz, up to `late_us` late.
-std::vector<Sent> with_wheels(std::vector<Sent> all, int64_t late_us) {
-  for (int i = 0; i < 5 * kFrames; ++i) {
-    const int64_t t = 20'000 * (i + 1);
-    wheels_t m{};
-    m.num_speeds = 1;
-    m.direction = wheels_t::DIRECTION_SIGNED;
-    m.speed_mps[0] = t <= kFrame_us * 61 ? 8.0 : 0.0;
-    all.push_back(sent("WHEELS", t, i, m, (i % 3) * late_us / 3));
-  }
-  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
-  return all;
-}
-
-VoTrackerConfig threads(int count) {
-  VoTrackerConfig config;
-  config.threads = count;
-  return config;
-}
-
-Collector run(const std::vector<Sent>& messages, bool stereo, int num_threads = 1) {
-  Collector sink;
-  StageRunner runner(make_vo_tracker(calibration(stereo), threads(num_threads)), sink);
-  for (const Sent& m : messages) feed(runner, m);
-  return sink;
-}
-
-bool same_outputs(const Collector& a, const Collector& b) {
-  for (const char* channel : {"POSE_VO", "VO_STATUS", "VO_FEATURES"}) {
-    if (a.messages.at(channel) != b.messages.at(channel)) return false;
-  }
-  return true;
-}
 
 TEST_CASE("a pose, a status and the features come with every frame, for now") {
   const Collector out = run(pictures(), true);
@@ -132,45 +50,13 @@ TEST_CASE("a pose, a status and the features come with every frame, for now") {
 }
 
 TEST_CASE("one thread or two, late wheels or punctual ones: the same bytes") {
-  const Collector one = run(with_wheels(pictures(), 0), false, 1);
-  CHECK(same_outputs(one, run(with_wheels(pictures(), 45'000), false, 2)));
-  CHECK_FALSE(
-      same_outputs(one, run(with_wheels(pictures(), 400'000), false, 1)));  // teeth: too late counts as not there
-  const Collector stereo = run(pictures(), true, 1);
-  for (const int threads : {2, 1, 2, 2}) CHECK(same_outputs(stereo, run(pictures(), true, threads)));  // five runs
-}
-
-TEST_CASE("mono takes its scale from the wheels and says so") {
-  for (const bool wheels : {false, true}) {
-    const Collector out = run(wheels ? with_wheels(pictures(), 0) : pictures(), false);
-    const auto poses = out.all<pose_t>("POSE_VO");
-    const auto status = out.all<vo_status_t>("VO_STATUS").back();
-    CHECK(status.scale_source == (wheels ? vo_status_t::SCALE_FROM_WHEELS : vo_status_t::SCALE_FROM_NONE));
-    CHECK(poses.back().scale == (wheels ? pose_t::SCALE_METRIC : pose_t::SCALE_UNKNOWN));
-    const auto way = poses[60].position_m[0] - poses[20].position_m[0];
-    if (wheels) CHECK(way == Approx(40 * kStep).epsilon(0.03));
-    if (wheels) CHECK(status.scale_std == Approx(0.02));
+  const Collector one = run(with_wheels(pictures(), 0), false);
+  for (const int count : {2, 1, 2, 2}) {  // with the first, five runs
+    CHECK(same_outputs(one, run(with_wheels(pictures(), 45'000), false, threads(count))));
   }
-}
-
-TEST_CASE("INS speeds that come after the start give a running map its scale") {
-  std::vector<Sent> all = pictures();
-  for (int i = 0; i < kFrames; ++i) {
-    pose_t m{};
-    m.q_wxyz[0] = 1.0;
-    m.validity = pose_t::VALIDITY_VALID;
-    m.velocity_mps[0] = 8.0;
-    m.cov_velocity_m2ps2[0][0] = 0.01;
-    if (i > 15 && i < 60) all.push_back(sent("POSE_INS", kFrame_us * (i + 1), i, m));
-  }
-  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
-  const Collector out = run(all, false);
-  const auto statuses = out.all<vo_status_t>("VO_STATUS");
-  const auto poses = out.all<pose_t>("POSE_VO");
-  CHECK(statuses[18].scale_source == vo_status_t::SCALE_FROM_NONE);  // 500 ms of delay are not over
-  CHECK(statuses[59].scale_source == vo_status_t::SCALE_FROM_INS);
-  CHECK(poses[59].reset_counter == 1);
-  CHECK(poses[59].position_m[0] - poses[35].position_m[0] == Approx(24 * kStep).epsilon(0.03));
+  CHECK_FALSE(same_outputs(one, run(with_wheels(pictures(), 400'000), false)));  // teeth: too late counts as not there
+  const Collector stereo = run(pictures(), true);
+  for (const int count : {2, 1, 2, 2}) CHECK(same_outputs(stereo, run(pictures(), true, threads(count))));
 }
 
 TEST_CASE("a restart takes effect half a second after its time, on whatever frame comes then") {

@@ -1,0 +1,177 @@
+/// What the stage says about itself, and what it can be told: VO_STATUS and VO_FEATURES, scale, stamps, a bad lens.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <roadfix/pose_t.hpp>
+#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_status_t.hpp>
+
+#include "small_street.h"
+
+namespace roadfix {
+namespace {
+
+using namespace test;
+
+/// INS poses at the pictures' times, from the frame `first` until the car stands.
+std::vector<Sent> with_ins(std::vector<Sent> all, int first, double sigma) {
+  for (int i = first; i < 60; ++i) {
+    pose_t m{};
+    m.q_wxyz[0] = 1.0;
+    m.validity = pose_t::VALIDITY_VALID;
+    m.velocity_mps[0] = 8.0;
+    m.cov_velocity_m2ps2[0][0] = sigma * sigma;
+    all.push_back(sent("POSE_INS", kFrame_us * (i + 1), i, m));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
+  return all;
+}
+
+std::vector<Sent> without_pictures_before(std::vector<Sent> all, int frame) {
+  std::erase_if(all, [frame](const Sent& m) {
+    return m.channel.starts_with("CAMERA") && m.arrival_us < kFrame_us * (frame + 1);
+  });
+  return all;
+}
+
+TEST_CASE("mono takes its scale from the wheels and says so") {
+  for (const bool wheels : {false, true}) {
+    const Collector out = run(wheels ? with_wheels(pictures(), 0) : pictures(), false);
+    const auto poses = out.all<pose_t>("POSE_VO");
+    const auto status = out.all<vo_status_t>("VO_STATUS").back();
+    CHECK(status.scale_source == (wheels ? vo_status_t::SCALE_FROM_WHEELS : vo_status_t::SCALE_FROM_NONE));
+    CHECK(poses.back().scale == (wheels ? pose_t::SCALE_METRIC : pose_t::SCALE_UNKNOWN));
+    const auto way = poses[60].position_m[0] - poses[20].position_m[0];
+    if (wheels) CHECK(way == Approx(40 * kStep).epsilon(0.03));
+    if (wheels) CHECK(status.scale_std == Approx(0.02));
+  }
+}
+
+TEST_CASE("INS speeds that come after the start give a running map its scale") {
+  const Collector out = run(with_ins(pictures(), 16, 0.1), false);
+  const auto statuses = out.all<vo_status_t>("VO_STATUS");
+  const auto poses = out.all<pose_t>("POSE_VO");
+  CHECK(statuses[18].scale_source == vo_status_t::SCALE_FROM_NONE);  // 500 ms of delay are not over
+  CHECK(statuses[59].scale_source == vo_status_t::SCALE_FROM_INS);
+  CHECK(poses[59].reset_counter == 1);
+  CHECK(poses[59].position_m[0] - poses[35].position_m[0] == Approx(24 * kStep).epsilon(0.03));
+}
+
+TEST_CASE("mono takes its scale from who knows it best, from whom it is told, or from nobody") {
+  const auto scaled = [](const std::vector<Sent>& messages, ScaleChoice choice) {
+    VoTrackerConfig config = threads(1);
+    config.keyframe.scale = choice;
+    return run(messages, false, config);
+  };
+  const auto source = [](const Collector& out) { return out.all<vo_status_t>("VO_STATUS")[40].scale_source; };
+  const auto ins = without_pictures_before(with_ins(pictures(), 0, 0.05), 10);
+  const Collector out = scaled(ins, ScaleChoice::kAuto);
+  const auto poses = out.all<pose_t>("POSE_VO");
+  CHECK(source(out) == vo_status_t::SCALE_FROM_INS);
+  CHECK(poses[40].scale == pose_t::SCALE_METRIC);
+  CHECK(poses[40].reset_counter == 1);  // half a second after the map's begin, as all feedback
+  CHECK(poses[40].position_m[0] - poses[20].position_m[0] == Approx(20 * kStep).epsilon(0.03));
+  CHECK(out.all<vo_status_t>("VO_STATUS")[40].scale_std == Approx(0.05 / 8.0).epsilon(0.01));
+  // Wheels know 2 %, the INS 0.6 % or 6 %.
+  CHECK(source(scaled(with_wheels(ins, 0), ScaleChoice::kAuto)) == vo_status_t::SCALE_FROM_INS);
+  CHECK(source(scaled(with_wheels(ins, 0), ScaleChoice::kWheels)) == vo_status_t::SCALE_FROM_WHEELS);
+  const auto vague = without_pictures_before(with_ins(with_wheels(pictures(), 0), 0, 0.5), 10);
+  CHECK(source(scaled(vague, ScaleChoice::kAuto)) == vo_status_t::SCALE_FROM_WHEELS);
+  CHECK(source(scaled(vague, ScaleChoice::kIns)) == vo_status_t::SCALE_FROM_INS);
+  const Collector none = scaled(with_wheels(ins, 0), ScaleChoice::kNone);
+  CHECK(source(none) == vo_status_t::SCALE_FROM_NONE);
+  CHECK(none.all<pose_t>("POSE_VO").back().scale == pose_t::SCALE_UNKNOWN);
+}
+
+/// Paper A's figures 5 to 7: matches and inliers per picture, and which feature is which.
+TEST_CASE("the status counts what the features show, in every picture") {
+  for (const bool stereo : {true, false}) {
+    const Collector out = run(pictures(), stereo);
+    const auto statuses = out.all<vo_status_t>("VO_STATUS");
+    const auto features = out.all<vo_features_t>("VO_FEATURES");
+    REQUIRE(statuses.size() == features.size());
+    int judged_pictures = 0, outliers = 0;
+    for (size_t i = 0; i < statuses.size(); ++i) {
+      CAPTURE(stereo, i);
+      const vo_status_t& s = statuses[i];
+      const auto count = [&](int8_t use) {
+        return static_cast<int>(std::count(features[i].use.begin(), features[i].use.end(), use));
+      };
+      const int inlier = count(vo_features_t::USE_INLIER), outlier = count(vo_features_t::USE_OUTLIER);
+      CHECK(s.utime == features[i].utime);
+      CHECK(s.num_features == features[i].num_features);
+      CHECK(s.num_matches == inlier + outlier + count(vo_features_t::USE_MATCHED));
+      CHECK(s.num_inliers == inlier);
+      CHECK(s.inlier_ratio == Approx(inlier + outlier > 0 ? static_cast<double>(inlier) / (inlier + outlier) : 0.0));
+      judged_pictures += inlier + outlier > 0 ? 1 : 0;
+      outliers += outlier;
+    }
+    CHECK(judged_pictures > 90);
+    CHECK(outliers > 10);  // teeth: there was something to tell apart
+  }
+}
+
+/// Root mean square of the speed's error while the car drives at 8 m/s.
+double speed_error(const Collector& out) {
+  const auto poses = out.all<pose_t>("POSE_VO");
+  double sum = 0.0;
+  for (size_t i = 20; i < 60; ++i) sum += std::pow(poses[i].velocity_mps[0] - 8.0, 2);
+  return std::sqrt(sum / 40.0);
+}
+
+TEST_CASE("stamps that jitter are put on the device's beat where the configuration asks for it") {
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int64_t> late(0, 30'000);
+  std::vector<Sent> all;
+  for (size_t i = 0; i + 1 < pictures().size(); i += 2) {
+    const int64_t delay_us = late(random);
+    for (const size_t k : {i, i + 1}) {
+      Sent m = pictures()[k];
+      image_t picture = decode<image_t>(m.bytes);
+      picture.utime += delay_us;
+      all.push_back({m.arrival_us + delay_us, m.channel, encode(picture)});
+    }
+  }
+  VoTrackerConfig config = threads(1);
+  CHECK_FALSE(config.filter_stamps);
+  const Collector raw = run(all, true, config);
+  config.filter_stamps = true;
+  const Collector filtered = run(all, true, config);
+  CHECK(speed_error(raw) > 0.5);  // teeth
+  CHECK(speed_error(filtered) < 0.3 * speed_error(raw));
+  CHECK(filtered.all<pose_t>("POSE_VO").back().utime == all.back().arrival_us);  // poses are for the clock's time
+  CHECK(same_outputs(run(pictures(), true), run(pictures(), true, config)));     // stamps that are even stay
+}
+
+TEST_CASE("a lens half covered for good is driven with, and so is one with a picture in ten torn") {
+  std::vector<Sent> half = pictures(), torn = pictures();
+  for (size_t i = 20; i < half.size(); ++i) {
+    image_t m = decode<image_t>(half[i].bytes);
+    cv::Mat picture = cv::imdecode(m.data, cv::IMREAD_GRAYSCALE);
+    picture.colRange(0, kWidth / 2).setTo(90);
+    cv::imencode(".png", picture, m.data);
+    m.size_bytes = static_cast<int32_t>(m.data.size());
+    half[i].bytes = encode(m);
+  }
+  for (size_t i = 20; i < torn.size(); i += 20) {
+    image_t m = decode<image_t>(torn[i].bytes);
+    m.data.resize(m.data.size() / 2);
+    m.size_bytes = static_cast<int32_t>(m.data.size());
+    torn[i].bytes = encode(m);
+  }
+  for (const auto& messages : {half, torn}) {
+    const Collector out = run(messages, true);
+    const auto poses = out.all<pose_t>("POSE_VO");
+    REQUIRE(poses.size() == kFrames);
+    CHECK(poses.back().validity == pose_t::VALIDITY_VALID);
+    CHECK(poses.back().reset_counter == 0);
+    CHECK(poses.back().position_m[0] == Approx(travelled(kFrames)).epsilon(0.03));
+    CHECK(std::abs(poses.back().position_m[1]) < 0.5);
+    const auto valid =
+        std::count_if(poses.begin(), poses.end(), [](const pose_t& p) { return p.validity == pose_t::VALIDITY_VALID; });
+    CHECK(valid >= kFrames - 9);
+  }
+}
+
+}  // namespace
+}  // namespace roadfix
