@@ -46,6 +46,9 @@ struct KeyframeTrackerConfig {
   double start_flow_px = 15.0;  ///< median motion since the first picture
   int start_points = 60;        ///< points that the first two keyframes must agree on
   ScaleChoice scale = ScaleChoice::kAuto;
+  /// Roll and pitch of an INS that are known at least so well turn the map to the horizon, once; zero: never, the map
+  /// keeps the vehicle's axes at the first pose.
+  double level_std_deg = 0.3;
   // Places.
   bool close_loops = true;  ///< remember places, know them again, close loops and find back after a loss
   int max_places = 1000;    ///< remembered, about one in 5 m
@@ -82,6 +85,7 @@ void visit(KeyframeTrackerConfig& c, Visitor& v) {
             {"wheels", ScaleChoice::kWheels},
             {"ins", ScaleChoice::kIns},
             {"none", ScaleChoice::kNone}});
+  v.number("level_std_deg", c.level_std_deg, 0.0, 5.0);
   v.boolean("close_loops", c.close_loops);
   v.integer("max_places", c.max_places, 10, 100000);
   v.integer("min_inliers", c.min_inliers, 6, 1000);

@@ -66,6 +66,7 @@ void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Fe
   find_back(frame);
   start_ = Start{};
   start_->t_us = frame.t_us;
+  note_attitude(frame.t_us);
   std::vector<Feature> all = features;
   for (const Feature& f : front_end_->replenish()) {
     all.push_back(f);
@@ -105,6 +106,7 @@ void KeyframeTracker::start_mono(const CameraFrame& frame) {
   wait_for_parallax(frame.t_us, pairs.tracks.size());
   if (flow.empty()) flow.push_back(0.0);
   std::nth_element(flow.begin(), flow.begin() + static_cast<std::ptrdiff_t>(flow.size() / 2), flow.end());
+  if (flow.size() > 1 && flow[flow.size() / 2] < config_.standing_flow_px) note_attitude(frame.t_us);
   // What is near leaves the picture first and what stays moves little: rather a short way than none. Whether it is
   // long enough, the parallax of the points says.
   const bool last_chance = 2 * pairs.tracks.size() < start_->seen.size();

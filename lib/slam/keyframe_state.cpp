@@ -38,7 +38,7 @@ void KeyframeTracker::forget_map() {
 void KeyframeTracker::restart(const Restart& restart) {
   forget_map();
   restart_ = restart;
-  restarted_ = true;
+  restarted_ = levelled_ = true;  // the pose given is in whatever axes it is given in
   continuous_ = found_back_ = false;
 }
 
@@ -175,6 +175,7 @@ void KeyframeTracker::members(Tracker& self, Archive& archive) {
           self.landmarks_at_keyframe_, self.found_share_, self.after_keyframe_);
   archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
           self.scale_std_, self.restarted_, self.restart_);
+  archive(self.new_levels_, self.attitudes_, self.levelled_);
 }
 
 void KeyframeTracker::save(StateWriter& writer) const {

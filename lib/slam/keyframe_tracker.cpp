@@ -113,6 +113,7 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   fresh.closed_reset_delta = out_.closed_reset_delta;
   fresh.odometry.t_us = frame.t_us;
   out_ = std::move(fresh);
+  take_level();
   if (restarted_) arrive(frame.t_us);
   if (const std::string reason = unusable(frame); !reason.empty()) {
     miss(frame.t_us, reason);
@@ -236,6 +237,7 @@ void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix
   if (t_us_) motion_ = Motion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
   T_map_camera_ = T_map_camera;
   t_good_us_ = t_us;
+  note_attitude(t_us);
   const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
   const Matrix6d cov = carried(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;

@@ -4,9 +4,9 @@
 /// turns those whose points are known into a pose, slam/local_map.cpp makes a keyframe and new points where needed,
 /// slam/bundle.cpp adjusts the last keyframes. This class calls them in that order.
 ///
-/// Frames: local has the vehicle's axes at the first pose, not the horizon's; the map's coordinates. camera: the left
-/// eye. Without stereo lengths are in a unit of the tracker's own until something else gives their scale. A bundle
-/// adjustment begun at one frame is applied at the next, wherever it runs: same pictures, same bits.
+/// Frames: local has the vehicle's axes at the first pose until an INS says where up is; the map's coordinates. camera:
+/// the left eye. Without stereo lengths are in a unit of the tracker's own until something else gives their scale. A
+/// bundle adjustment begun at one frame is applied at the next, wherever it runs: same pictures, same bits.
 #pragma once
 
 #include <memory>
@@ -54,14 +54,26 @@ struct TrackedFrame {
   SE3 closed_reset_delta;
   int num_loops = 0;
   std::vector<UsedFeature> features;
-  int num_expected = 0;  ///< tracks looked for
-  int num_matches = 0;   ///< tracks found again
+  int num_expected = 0;        ///< tracks looked for
+  int num_matches = 0;         ///< tracks found again
   int num_landmarks_seen = 0;  ///< of these, whose points are known: only they can be judged
   int num_inliers = 0;         ///< of these, that agree with the pose
   double rms_px = 0.0;
   double brightness = 0.0;  ///< mean grey level
   int64_t num_keyframes = 0;
   int64_t num_landmarks = 0;
+};
+
+/// Which way is up, of an INS.
+struct LevelSample {
+  int64_t t_us = 0;
+  Eigen::Quaterniond q_level_vehicle = Eigen::Quaterniond::Identity();  ///< against axes of which z is up
+  double sigma = 0.0;                                                   ///< rad, of roll and pitch, the worse one
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.t_us, self.q_level_vehicle.coeffs(), self.sigma);
+  }
 };
 
 /// A pose from which to start again.
@@ -89,6 +101,10 @@ class KeyframeTracker {
   /// A speed of the vehicle from wheels or an INS: gives mono its scale. It counts from the next frame on, for the past
   /// as well: speeds may come later than the frames of their time.
   void speed(const SpeedSample& sample) { new_speeds_.push_back(sample); }
+
+  /// An INS's attitude: the first that is good enough and of a frame's time turns the map level, about the vehicle. The
+  /// reset counter says so where there has been a pose.
+  void level(const LevelSample& sample) { new_levels_.push_back(sample); }
 
   /// Starts again at this pose: the map is forgotten, the next frame begins there.
   void restart(const Restart& restart);
@@ -118,6 +134,15 @@ class KeyframeTracker {
     template <class Self, class Archive>
     static void members(Self& self, Archive& archive) {
       archive(self.T_before_now, self.dt_s);
+    }
+  };
+  struct Attitude {
+    int64_t t_us = 0;
+    Eigen::Quaterniond q_map_vehicle = Eigen::Quaterniond::Identity();
+
+    template <class Self, class Archive>
+    static void members(Self& self, Archive& archive) {
+      archive(self.t_us, self.q_map_vehicle.coeffs());
     }
   };
   struct Start {  ///< the first picture of a start without stereo
@@ -155,6 +180,9 @@ class KeyframeTracker {
   [[nodiscard]] std::optional<KnownTravel> camera_travelled(int64_t begin_us, const SE3& T_map_begin, int64_t end_us,
                                                             const SE3& T_map_end) const;
   void take_speeds();
+  void note_attitude(int64_t t_us);
+  void take_level();
+  void turn_map(const Eigen::Quaterniond& q, double sigma);
   void take_scale();
   void name_scale(const KnownTravel& known);
   void forget_map();
@@ -204,6 +232,9 @@ class KeyframeTracker {
   bool found_back_ = false;  ///< the next map begins at a place known from before
   std::vector<SpeedSample> new_speeds_;
   TravelHistory wheels_, ins_;
+  std::vector<LevelSample> new_levels_;
+  std::deque<Attitude> attitudes_;          ///< of the last frames, until the map is level
+  bool levelled_ = false;                   ///< or was told where it is
   ScaleSource scale_ = ScaleSource::kNone;  ///< of the map
   double scale_std_ = 0.0;
   bool restarted_ = false;  ///< and no frame since

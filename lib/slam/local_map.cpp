@@ -185,6 +185,14 @@ void LocalMap::rescale(double factor) {
   }
 }
 
+void LocalMap::turn(const LevelTurn& turn) {
+  const SE3 T = turn.transform();
+  for (Keyframe& k : keyframes_) k.T_map_camera = T * k.T_map_camera;
+  for (auto& [track, landmark] : landmarks_) {
+    if (landmark.p_map) landmark.p_map = T * *landmark.p_map;
+  }
+}
+
 template <class Map, class Archive>
 void LocalMap::members(Map& self, Archive& archive) {
   archive(self.next_id_, self.lens_.value, self.lens_information_, self.keyframes_, self.landmarks_);

@@ -10,6 +10,7 @@
 
 #include "slam/bundle.h"
 #include "slam/config.h"
+#include "slam/level.h"
 #include "slam/travel.h"
 
 namespace roadfix {
@@ -79,6 +80,7 @@ class LocalMap {
 
   /// All lengths times `factor`, the camera of the last keyframe staying where it is.
   void rescale(double factor);
+  void turn(const LevelTurn& turn);
 
   void save(StateWriter& writer) const;
   void load(StateReader& reader);

@@ -141,6 +141,17 @@ void LoopCloser::forget_oldest() {
   index_.forget_before(first);
 }
 
+void LoopCloser::turn(const LevelTurn& turn) {
+  const SE3 T = turn.transform();
+  const Sim3 S{T.q, T.p, 1.0};
+  for (Place& place : places_) {
+    place.S_map_camera = S * place.S_map_camera;
+    place.cov = turn.covariance(place.cov, place.S_map_camera.rigid());
+  }
+  T_odom_last_ = T * T_odom_last_;
+  S_map_odom_ = S * S_map_odom_ * S.inverse();
+}
+
 bool LoopCloser::visit(const PlaceView& view, bool continuous) {
   const auto found = recognise(view, next_id_ - kRecent, config_.with_scale);
   const int64_t id = next_id_;

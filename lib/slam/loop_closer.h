@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "slam/level.h"
 #include "slam/place_index.h"
 #include "slam/pose_graph.h"
 #include "slam/pose_solver.h"
@@ -41,6 +42,9 @@ class LoopCloser {
 
   /// Where the camera is in odom, if it sees a place that it knows.
   [[nodiscard]] std::optional<SE3> locate(const PlaceView& view) const;
+
+  /// The odometry's axes have been turned; the map's are too.
+  void turn(const LevelTurn& turn);
 
   [[nodiscard]] const Sim3& S_map_odom() const { return S_map_odom_; }
   /// Covariance of the camera's pose in map, right after a visit() that was true.

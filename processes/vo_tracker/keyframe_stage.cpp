@@ -72,7 +72,9 @@ void KeyframeStage::apply(const Message& m) {
     const auto speed = wheel_speed(wheel_sample(decode<wheels_t>(m.bytes)), calibration_.sensors.wheels);
     if (speed) tracker_->speed(*speed);
   } else if (m.input == ins_) {
-    if (const auto speed = ins_speed(odometry(decode<pose_t>(m.bytes)))) tracker_->speed(*speed);
+    const Odometry ins = odometry(decode<pose_t>(m.bytes));
+    if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
+    if (const auto level = ins_level(ins)) tracker_->level(*level);
   } else if (m.input == restart_) {
     if (left_) track(*left_);
     tracker_->restart(restart(decode<vo_restart_t>(m.bytes)));

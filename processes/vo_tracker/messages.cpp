@@ -144,4 +144,10 @@ std::optional<SpeedSample> ins_speed(const Odometry& o) {
   return SpeedSample{o.t_us, SpeedSource::kIns, speed, sigma, sigma / std::max(kSlow, speed)};
 }
 
+std::optional<LevelSample> ins_level(const Odometry& o) {
+  const double variance = std::max(o.cov_pose(3, 3), o.cov_pose(4, 4));  // rotation in vehicle axes: roll, pitch
+  if (o.validity == Validity::kInvalid || !o.T_frame_vehicle.q.coeffs().allFinite() || !(variance > 0.0)) return {};
+  return LevelSample{o.t_us, o.T_frame_vehicle.q, std::sqrt(variance)};
+}
+
 }  // namespace roadfix

@@ -22,5 +22,6 @@ Restart restart(const vo_restart_t& message);
 /// How fast the vehicle goes; nothing where the sample cannot tell.
 std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels);
 std::optional<SpeedSample> ins_speed(const Odometry& odometry);
+std::optional<LevelSample> ins_level(const Odometry& odometry);
 
 }  // namespace roadfix

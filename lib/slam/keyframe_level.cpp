@@ -1,0 +1,52 @@
+/// The tracker's map and the horizon: turned to it once, where somebody knows it.
+#include <cmath>
+
+#include "slam/keyframe_tracker.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int64_t kRemembered_us = 1'500'000;  ///< attitudes; an INS is heard half a second later
+constexpr int64_t kTogether_us = 25'000;       ///< a car's body turns by less than 0.1 deg meanwhile
+
+}  // namespace
+
+void KeyframeTracker::note_attitude(int64_t t_us) {
+  if (levelled_ || config_.level_std_deg <= 0.0) return;
+  attitudes_.push_back({t_us, (T_map_camera_ * rig_.T_vehicle_left.inverse()).q});
+  while (attitudes_.front().t_us < t_us - kRemembered_us) attitudes_.pop_front();
+}
+
+void KeyframeTracker::take_level() {
+  const double worst = config_.level_std_deg * M_PI / 180.0;
+  for (const LevelSample& sample : new_levels_) {
+    if (levelled_ || !(sample.sigma <= worst)) continue;
+    for (const Attitude& seen : attitudes_) {
+      if (std::abs(seen.t_us - sample.t_us) > kTogether_us) continue;
+      turn_map(turn_to_level(seen.q_map_vehicle, sample.q_level_vehicle), sample.sigma);
+      break;
+    }
+  }
+  new_levels_.clear();
+}
+
+/// About the vehicle: its position stays, what it has driven moves.
+void KeyframeTracker::turn_map(const Eigen::Quaterniond& q, double sigma) {
+  const SE3 T_vehicle_left = rig_.T_vehicle_left, T_map_vehicle = T_map_camera_ * T_vehicle_left.inverse();
+  const LevelTurn turn{q, T_map_vehicle.p, sigma};
+  map_.turn(turn);
+  loops_.turn(turn);
+  T_map_camera_ = turn.transform() * T_map_camera_;
+  const SE3& T_known = map_.empty() ? T_map_camera_ : map_.last().T_map_camera;
+  cov_keyframe_ = turn.covariance(cov_keyframe_, T_known);
+  cov_closed_ = turn.covariance(cov_closed_, loops_.S_map_odom().rigid() * T_known);
+  levelled_ = true;
+  attitudes_.clear();
+  if (!t_good_us_) return;  // nobody has seen a pose yet
+  const SE3 T_turned = T_map_camera_ * T_vehicle_left.inverse();
+  ++out_.reset_counter;
+  ++out_.closed_reset_counter;
+  out_.reset_delta = out_.closed_reset_delta = {T_map_vehicle.q.conjugate() * T_turned.q, Eigen::Vector3d::Zero()};
+}
+
+}  // namespace roadfix
