@@ -107,20 +107,37 @@ void Msckf::propagate(int64_t t_us) {
   propagation_.apply(state_, config_.aiding);
 }
 
-std::optional<Eigen::Matrix3d> Msckf::camera_turn(int64_t before_us, int64_t now_us) const {
+std::optional<CameraMotion> Msckf::camera_motion(int64_t before_us, int64_t now_us,
+                                                 std::span<const ImuSample> ahead) const {
   const int64_t offset = micros(state_.camera.time_offset);
-  int64_t t = before_us + offset;
-  const int64_t end = now_us + offset;
-  if (imu_.size() < 2 || imu_.front().t_us > t || imu_.back().t_us < end - micros(kTurnSlack_s)) return std::nullopt;
-  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
-  for (size_t i = 1; i < imu_.size() && t < end; ++i) {
-    const int64_t to = std::min(imu_[i].t_us, end);
-    if (to <= t) continue;
-    q = q * exp_q(seconds_between(t, to) * state_.imu.rate(imu_[i].gyro));
-    t = to;
-  }
-  const Eigen::Quaterniond& q_imu_camera = state_.camera.T_imu_camera.q;
-  return (q_imu_camera.conjugate() * q.conjugate() * q_imu_camera).toRotationMatrix();
+  const int64_t begin = before_us + offset, end = now_us + offset;
+  const int64_t newest = !ahead.empty() ? ahead.back().t_us : imu_.empty() ? 0 : imu_.back().t_us;
+  if (imu_.size() < 2 || imu_.front().t_us > begin || newest < end - micros(kTurnSlack_s)) return std::nullopt;
+  const bool running = phase_ == MsckfPhase::kRunning;
+  ImuState x = state_.imu;
+  Eigen::Vector3d p_begin = x.p + std::min(0.0, seconds_between(x.t_us, begin)) * x.v;  // it may be ahead of `begin`
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  Propagation way(config_.vehicle);
+  int64_t t = imu_.front().t_us;
+  const auto carry = [&](const ImuSample& s) {
+    for (const int64_t stop : {std::min(s.t_us, begin), std::min(s.t_us, end)}) {
+      if (stop > std::max(t, begin)) turn = turn * exp_q(seconds_between(std::max(t, begin), stop) * x.rate(s.gyro));
+      t = std::max(t, stop);
+      if (!running || stop <= x.t_us) continue;
+      way.step(x, s.gyro, s.accel, seconds_between(x.t_us, stop));
+      x.t_us = stop;
+      if (stop <= begin) p_begin = x.p;
+    }
+  };
+  for (const ImuSample& s : imu_) carry(s);
+  for (const ImuSample& s : ahead) carry(s);
+  const SE3& T_imu_camera = state_.camera.T_imu_camera;
+  CameraMotion motion;
+  motion.R_now_before = (T_imu_camera.q.conjugate() * turn.conjugate() * T_imu_camera.q).toRotationMatrix();
+  if (!running) return motion;
+  const Eigen::Vector3d p_imu = x.q.conjugate() * (p_begin - x.p);  // of the imu before, in its axes now
+  motion.p_now_before = T_imu_camera.q.conjugate() * (p_imu + turn.conjugate() * T_imu_camera.p - T_imu_camera.p);
+  return motion;
 }
 
 bool Msckf::due(int64_t& next_us, double interval_s) const {

@@ -18,6 +18,7 @@
 #include "msckf/propagation.h"
 #include "msckf/stamp_line.h"
 #include "msckf/standing.h"
+#include "msckf/track_depths.h"
 #include "msckf/vehicle_aiding.h"
 #include "samples/samples.h"
 
@@ -63,8 +64,10 @@ class Msckf {
 
   /// Carried to `ahead`, newest samples that advance() has not seen yet, oldest first.
   [[nodiscard]] MsckfOutput output(std::span<const ImuSample> ahead = {}) const;
-  /// Turn of the camera from one stamp to another by the gyro; nothing where the samples do not reach.
-  [[nodiscard]] std::optional<Eigen::Matrix3d> camera_turn(int64_t before_us, int64_t now_us) const;
+  /// Motion of the camera from one stamp to another by the imu, its turn alone while it is not running; nothing where
+  /// the samples do not reach. `ahead`: as for output(); a late camera's pictures are newer than what advance() saw.
+  [[nodiscard]] std::optional<CameraMotion> camera_motion(int64_t before_us, int64_t now_us,
+                                                          std::span<const ImuSample> ahead = {}) const;
   /// Nothing before the first start.
   [[nodiscard]] const msckf::State* state() const { return phase_ == MsckfPhase::kRunning ? &state_ : nullptr; }
   [[nodiscard]] const msckf::PointCounts& counts() const { return points_.counts(); }

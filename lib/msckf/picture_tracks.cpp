@@ -1,5 +1,6 @@
 #include "msckf/picture_tracks.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "features/saved_features.h"
@@ -17,25 +18,18 @@ PictureTracks::PictureTracks(const CameraIntrinsics& left, const std::optional<R
   matcher_.emplace(left_, *right_, right->T_right_left, right->matching);
 }
 
-std::vector<Feature> PictureTracks::hints(const Eigen::Matrix3d& R_now_before) const {
-  std::vector<Feature> out;
-  out.reserve(features_.size());
-  for (const Feature& feature : features_) {
-    const auto ray = left_.unproject(feature.pixel.cast<double>());
-    if (!ray) continue;
-    const auto pixel = left_.project(R_now_before * Eigen::Vector3d(ray->x(), ray->y(), 1.0));
-    if (pixel) out.push_back({feature.track, pixel->cast<float>()});
-  }
-  return out;
-}
-
 SeenFrame PictureTracks::track(int64_t t_us, const cv::Mat& left, const cv::Mat& right,
-                               const std::optional<Eigen::Matrix3d>& R_now_before) {
-  std::vector<Feature> expected;
-  if (R_now_before) expected = hints(*R_now_before);
-  features_ = front_end_->track(left, expected);
+                               const std::optional<CameraMotion>& motion) {
+  TrackDepths::Expected expected;
+  if (motion) expected = depths_.expect(left_, *motion, left);
+  front_end_->drop(expected.lost);
+  features_ = front_end_->track(left, expected.hints);
+  const std::vector<int64_t> wrong = depths_.learn(left_, motion, features_);
+  front_end_->drop(wrong);
+  std::erase_if(features_, [&](const Feature& f) { return std::binary_search(wrong.begin(), wrong.end(), f.track); });
   const std::vector<Feature> fresh = front_end_->replenish();
   features_.insert(features_.end(), fresh.begin(), fresh.end());
+  depths_.keep(left_, features_, left);
   last_us_ = t_us;
   SeenFrame frame;
   frame.t_us = t_us;
@@ -62,6 +56,7 @@ SeenFrame PictureTracks::track(int64_t t_us, const cv::Mat& left, const cv::Mat&
 
 void PictureTracks::save(StateWriter& writer) const {
   front_end_->save(writer);
+  depths_.save(writer);
   save_features(features_, writer);
   writer.put(last_us_.has_value());
   writer.put(last_us_.value_or(0));
@@ -69,6 +64,7 @@ void PictureTracks::save(StateWriter& writer) const {
 
 void PictureTracks::load(StateReader& reader) {
   front_end_->load(reader);
+  depths_.load(reader);
   features_ = load_features(reader);
   const bool known = reader.get<bool>();
   const auto last_us = reader.get<int64_t>();

@@ -4,6 +4,7 @@
 #include "camera/camera.h"
 #include "features/front_end.h"
 #include "features/stereo_matcher.h"
+#include "msckf/track_depths.h"
 #include "msckf/tracks.h"
 
 namespace roadfix {
@@ -20,10 +21,10 @@ class PictureTracks {
   PictureTracks(const CameraIntrinsics& left, const std::optional<RightEye>& right,
                 std::unique_ptr<FrontEnd> front_end);
 
-  /// Tracks in the next picture; `right` may be empty. `R_now_before`: the camera's turn since the last one, where it
-  /// is known: tracks are looked for where it takes them.
+  /// Tracks in the next picture; `right` may be empty. `motion`: the camera's since the last one, where it is known:
+  /// tracks are looked for where it takes them, and end where it contradicts them.
   msckf::SeenFrame track(int64_t t_us, const cv::Mat& left, const cv::Mat& right,
-                         const std::optional<Eigen::Matrix3d>& R_now_before);
+                         const std::optional<CameraMotion>& motion);
 
   /// Where the last picture has its tracks.
   [[nodiscard]] std::span<const Feature> features() const { return features_; }
@@ -34,12 +35,11 @@ class PictureTracks {
   void load(StateReader& reader);
 
  private:
-  [[nodiscard]] std::vector<Feature> hints(const Eigen::Matrix3d& R_now_before) const;
-
   Camera left_;
   std::optional<Camera> right_;
   std::optional<StereoMatcher> matcher_;
   std::unique_ptr<FrontEnd> front_end_;
+  TrackDepths depths_;
   std::vector<Feature> features_;
   std::optional<int64_t> last_us_;
 };

@@ -96,7 +96,7 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
-  spec_.state_layout = 2;
+  spec_.state_layout = 3;
 }
 
 void MsckfStage::make_parts() {
@@ -142,9 +142,12 @@ void MsckfStage::track_waiting() {
   tracked_ = true;
   if (picture.left.empty()) return;
   brightness_ = cv::mean(picture.left)[0];
-  std::optional<Eigen::Matrix3d> turn;
-  if (const auto last = pictures_->last_us()) turn = filter_->camera_turn(*last, picture.t_us);
-  filter_->add(pictures_->track(picture.t_us, picture.left, picture.right, turn));
+  std::optional<CameraMotion> motion;
+  if (const auto last = pictures_->last_us()) {
+    const std::vector<ImuSample> ahead(ahead_.begin(), ahead_.end());
+    motion = filter_->camera_motion(*last, picture.t_us, ahead);
+  }
+  filter_->add(pictures_->track(picture.t_us, picture.left, picture.right, motion));
 }
 
 void MsckfStage::on_clock(const Message& m) { ahead_.push_back(imu_sample(decode<imu_t>(m.bytes))); }
