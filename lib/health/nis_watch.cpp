@@ -26,12 +26,18 @@ constexpr int64_t kInARow_us = 250'000;
 constexpr double kWithinClaims = 2.0;
 /// After the newest refusal a fast source is well again.
 constexpr int64_t kStillRefused_us = 500'000;
+/// And any source after this many in a row that fit, used or not, over kInARow_us: a map that is young errs now and
+/// then, so that the intervals between refusals say little of when the next is due.
+constexpr int kFitsAgain = 5;
 
 }  // namespace
 
 void NisWatch::seen(int64_t now_us, double nis, int dof, bool accepted) {
   if (!std::isfinite(nis) || dof <= 0) return;
-  if (!accepted && nis <= kWithinClaims * dof) return;
+  const bool fits = accepted || nis <= kWithinClaims * dof;
+  fits_in_a_row_ = fits ? fits_in_a_row_ + 1 : 0;
+  if (!fits) refused_us_ = now_us;
+  if (fits && !accepted) return;
   attempts_.push_back({now_us, nis, dof, accepted});
   while (attempts_.size() > kMost || now_us - attempts_.front().now_us > kOldest_us) attempts_.pop_front();
 }
@@ -79,6 +85,7 @@ bool NisWatch::refused_in_a_row(int64_t now_us) const {
 /// Whether refusals are still going on: the newest is no older than a few attempts would be. What came before a source
 /// fell silent, or was accepted again, is over.
 bool NisWatch::is_still_refused(int64_t now_us) const {
+  if (fits_in_a_row_ >= kFitsAgain && now_us - refused_us_ >= kInARow_us) return false;
   std::vector<int64_t> intervals_us;
   std::optional<int64_t> refused_us;
   const std::vector<Attempt> recent = window(now_us);  // newest first

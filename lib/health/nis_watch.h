@@ -42,6 +42,8 @@ class NisWatch {
   std::string source_;
   ConsistencyLimits limits_;
   std::deque<Attempt> attempts_;
+  int fits_in_a_row_ = 0;  ///< within their claims, used or not, since the newest that was not
+  int64_t refused_us_ = 0;
 };
 
 }  // namespace roadfix

@@ -217,3 +217,22 @@ TEST_CASE("refusals are over once a source is used again, or has fallen silent; 
   CHECK(refused_until([](int) { return std::nullopt; }) < 3.5);
   CHECK(refused_until([](int i) { return i % 3 == 0; }) > 5.7);
 }
+
+TEST_CASE("a source that fits again without being used is no longer told; one that errs now and then is") {
+  // 10 Hz, on probation: nothing is used, and every fifth contradicts the estimate, until `fits_from_s`.
+  const auto told_until = [](double fits_from_s) {
+    NisWatch watch("POSE_VO in FUSION", ConsistencyLimits{});
+    double last = 0.0;
+    for (int i = 0; i < 60; ++i) {
+      const double t = 0.1 * i;
+      watch.seen(test::at(t), i % 5 == 0 && t < fits_from_s ? 30.0 : 1.0, 3, false);
+      std::vector<Condition> conditions;
+      watch.judge(test::at(t + 0.01), conditions);
+      if (!conditions.empty()) last = t;
+    }
+    return last;
+  };
+  CHECK(told_until(3.0) < 3.05);  // the last that did not fit came at 2.5 s
+  CHECK(told_until(3.0) > 2.5);
+  CHECK(told_until(9.0) > 5.8);
+}
