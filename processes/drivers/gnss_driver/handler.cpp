@@ -139,8 +139,8 @@ void GnssDriver::take_pvt(const UbxNavPvt& m, int64_t read_utime) {
   const double horizontal = m.horizontal_accuracy_mm * kMetresPerMm;
   fix->cov_enu = diagonal(horizontal, horizontal, m.vertical_accuracy_mm * kMetresPerMm);
   GnssVelocity velocity;  // north, east, down to east, north, up
-  velocity.enu =
-      kMetresPerMm * Eigen::Vector3d(m.velocity_ned_mmps[1], m.velocity_ned_mmps[0], -m.velocity_ned_mmps[2]);
+  const Eigen::Vector3d ned(m.velocity_ned_mmps[0], m.velocity_ned_mmps[1], m.velocity_ned_mmps[2]);
+  velocity.enu = kMetresPerMm * Eigen::Vector3d(ned.y(), ned.x(), -ned.z());
   const double speed_std = m.speed_accuracy_mmps * kMetresPerMm;
   velocity.cov_enu = diagonal(speed_std, speed_std, speed_std);
   fix->velocity = velocity;
