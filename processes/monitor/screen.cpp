@@ -138,14 +138,14 @@ void put_reasons(Page& page, const HealthReport& report) {
 void put_channels(Page& page, const HealthReport& report) {
   if (page.left() < 4) return;
   page.line("");
-  page.line(fmt::format(" {:<14}{:>8}{:>9}{:>9}{:>10}{:>9}{:>7}{:>7}", "channel", "per s", "wanted", "age s", "late ms",
-                        "jitter", "lost", "bad"),
+  page.line(fmt::format(" {:<14}{:>8}{:>9}{:>9}{:>9}{:>11}{:>7}{:>7}", "channel", "per s", "wanted", "age s", "late ms",
+                        "jitter ms", "lost", "bad"),
             kBold);
   for (const ChannelReport& c : report.channels) {
     if (!comes_at_a_rate(c.name)) continue;
     const std::string wanted = c.expected_hz ? fmt::format("{:.4g}", *c.expected_hz) : "?";
     const bool bad = c.silent || c.age_s < 0.0;
-    page.line(fmt::format(" {:<14.14}{:>8.1f}{:>9}{:>9.2f}{:>10.0f}{:>9.0f}{:>7}{:>7}", c.name, c.rate_hz, wanted,
+    page.line(fmt::format(" {:<14.14}{:>8.1f}{:>9}{:>9.2f}{:>9.0f}{:>11.0f}{:>7}{:>7}", c.name, c.rate_hz, wanted,
                           std::max(0.0, c.age_s), c.latency_s * 1e3, c.jitter_s * 1e3, c.lost, c.undecodable),
               bad ? kColours[1] : nullptr);
   }

@@ -57,6 +57,8 @@ class DashboardTest(unittest.TestCase):
                 self.assertIn("Truth", self.text("#legend"))
                 self.assertIn("How far off", self.text("#errors-title"))
                 self.assertLessEqual(self.browser.value("document.documentElement.scrollWidth"), width)
+                beside = self.browser.value("[...document.querySelectorAll('.scroll')].map((box) => box.scrollWidth - box.clientWidth)")
+                self.assertEqual(beside, [0, 0, 0], "a table scrolls sideways")
 
     def test_a_pose_that_is_none_has_no_numbers(self):
         self.open(1280, 0.5)
@@ -65,7 +67,7 @@ class DashboardTest(unittest.TestCase):
         self.assertNotIn("°", self.text("#facts"))
         self.open(1280, 20)
         self.assertNotIn("not known", self.text("#facts"))
-        self.assertRegex(self.text("#facts"), r"(?i)heading sure to\s+\d+\.\d\s+°")
+        self.assertRegex(self.text("#facts"), r"(?i)heading sure to\s+± \d+\.\d\s+°")
 
     def test_something_is_drawn(self):
         self.open(1280, 45)

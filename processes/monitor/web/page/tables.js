@@ -1,5 +1,5 @@
 // Everything on the page that is words and numbers.
-import { clock, colour, duration, element, fixed, metres, title } from './format.js';
+import { clock, colour, describe, duration, element, fixed, metres, title } from './format.js';
 
 const VERDICTS = ['OK to use', 'Degraded: use with care', 'Do not use'];
 const VALIDITIES = ['invalid', 'coasting', 'valid'];
@@ -14,7 +14,7 @@ export function showVerdict(frame, live) {
   document.title = `${VERDICTS[health.verdict]} – Roadfix`;
   const since = duration(Math.max(0, (frame.t - health.since) / 1000));
   const day = live && frame.lag > 86400 ? `, a drive of ${Math.round(frame.lag / 86400)} days ago played again` : '';
-  byId('verdict-about').textContent = health.judged ? `About ${title(health.judged)} (${health.judged}), for ${since}${day}` : 'Nobody says where the car is';
+  byId('verdict-about').textContent = health.judged ? `The verdict on ${describe(health.judged)} (${health.judged}), for ${since}${day}` : 'Nobody says where the car is';
   byId('reasons').replaceChildren(...health.reasons.slice(0, 6).map((r) => element('li', r.text, { class: `v${r.verdict}` })),
     ...(health.reasons.length > 6 ? [element('li', `and ${health.reasons.length - 6} more`)] : []));
   const pose = frame.poses.find((p) => p.name === health.judged);
@@ -22,12 +22,13 @@ export function showVerdict(frame, live) {
   if (pose) {
     const valid = VALIDITIES[pose.validity] !== 'invalid';
     const heading = valid && pose.yaw_sigma < 180;
-    facts.unshift(['Place sure to', valid ? metres(pose.sigma) : 'not known', ''], ['Heading sure to', heading ? fixed(pose.yaw_sigma, 1) : 'not known', heading ? '°' : ''],
+    const sigma = 'one standard deviation: the error is smaller two times out of three';
+    facts.unshift(['Place sure to', valid ? `± ${metres(pose.sigma)}` : 'not known', '', sigma], ['Heading sure to', heading ? `± ${fixed(pose.yaw_sigma, 1)}` : 'not known', heading ? '°' : '', sigma],
       ['Speed', valid ? (Math.abs(pose.speed) * 3.6).toFixed(0) : 'not known', valid ? 'km/h' : '']);
-    if (valid && pose.err != null) facts.unshift(['Really off by', metres(pose.err), '']);
+    if (valid && pose.err != null) facts.unshift(['Really off by', metres(pose.err), '', 'against the drive’s truth, which a car on the road does not have']);
   }
-  byId('facts').replaceChildren(...facts.map(([name, value, unit]) => {
-    const box = element('div');
+  byId('facts').replaceChildren(...facts.map(([name, value, unit, words]) => {
+    const box = element('div', '', words ? { title: words } : {});
     const number = element('dd', value);
     if (unit) number.append(' ', element('small', unit));
     box.append(element('dt', name), number);
@@ -58,14 +59,17 @@ export function showFusion(frame) {
   byId('tie').textContent = tie;
 }
 
+/** A head that begins with '-' is a column that a narrow screen goes without. */
 function table(id, heads, rows) {
+  const minor = heads.map((h) => h.startsWith('-'));
   const head = element('tr');
-  head.append(...heads.map((h) => element('th', h)));
+  head.append(...heads.map((h, i) => element('th', h.replace(/^-/, ''), minor[i] ? { class: 'minor' } : {})));
   const body = rows.map((cells) => {
     const row = element('tr');
-    row.append(...cells.map((c) => {
-      if (c instanceof Node) return c;
-      return Array.isArray(c) ? element('td', c[0], c[1] ? { class: 'warn' } : {}) : element('td', c);
+    row.append(...cells.map((c, i) => {
+      const cell = c instanceof Node ? c : element('td', Array.isArray(c) ? c[0] : c, Array.isArray(c) && c[1] ? { class: 'warn' } : {});
+      if (minor[i]) cell.classList.add('minor');
+      return cell;
     }));
     return row;
   });
@@ -79,16 +83,19 @@ function named(name, state, words) {
   return cell;
 }
 
+/** What a channel or a program is, for who has never seen one. */
+const meaning = (name) => element('td', describe(name), { class: 'meaning' });
+
 export function showTables(frame) {
-  table('channels', ['Channel', 'per second', 'should be', 'late ms', 'jitter ms', 'silent s', 'lost', 'unreadable'], frame.channels.map((c) => {
+  table('channels', ['Channel', '-what it is', 'per second', 'should be', 'late ms', '-jitter ms', '-silent s', 'lost', 'unreadable'], frame.channels.map((c) => {
     const slow = c.expected != null && c.rate < 0.7 * c.expected;
     const never = c.age == null || c.age < 0;
-    return [named(c.name, never || c.silent ? 'warn' : ''), [fixed(c.rate, 1), slow], c.expected == null ? 'learning' : fixed(c.expected, c.expected < 10 ? 1 : 0),
+    return [named(c.name, never || c.silent ? 'warn' : ''), meaning(c.name), [fixed(c.rate, 1), slow], c.expected == null ? 'learning' : fixed(c.expected, c.expected < 10 ? 1 : 0),
       fixed(c.latency, 0), fixed(c.jitter, 1), never ? ['never heard', true] : [fixed(c.age, 1), c.silent], [String(c.lost), false], [String(c.bad), c.bad > 0]];
   }));
-  table('processes', ['Program', 'state', 'CPU %', 'MiB', 'waits ms', 'restarts'], frame.processes.map((p) => {
+  table('processes', ['Program', '-what it does', 'state', 'CPU %', 'MiB', 'waits ms', 'restarts'], frame.processes.map((p) => {
     const fine = p.state === 'running' || p.state === 'starting';
-    return [named(p.name, fine ? '' : 'warn', p.reason), [p.state, !fine], fixed(p.cpu, 1), fixed(p.mib, 0), fixed(p.waits, 0), [String(p.restarts), p.restarts > 0]];
+    return [named(p.name, fine ? '' : 'warn', p.reason), meaning(p.name), [p.state, !fine], fixed(p.cpu, 1), fixed(p.mib, 0), fixed(p.waits, 0), [String(p.restarts), p.restarts > 0]];
   }));
   if (frame.processes.length === 0) byId('processes').replaceChildren(element('caption', 'No heartbeat in this log: it was computed at the desk.'));
   table('fits', ['Measurement', 'error / claim', 'used', 'refused'], frame.fits.map((f) => [named(f.source, f.ratio > 5 ? 'warn' : ''), [fixed(f.ratio, 2), f.ratio > 5], String(f.used), [String(f.refused), f.refused > f.used]]));
