@@ -1,5 +1,5 @@
 /// What every aiding source says about the state: residual, Jacobian, covariance. Pure functions; one file each
-/// (aiding_<source>.cpp), all Jacobians checked numerically. Equations (M.21)-(M.34) of MODEL.md.
+/// (aiding_<source>.cpp), all Jacobians checked numerically. Equations (M.21)-(M.34) and (M.44) of MODEL.md.
 #pragma once
 
 #include "gnss_ins/measurement.h"
@@ -29,6 +29,14 @@ Measurement<1> wheel_speed(const NavState& x, const BodyMotion& motion, double s
 
 /// Sideways and vertical speed of the vehicle at its point without sideslip: zero. R is the caller's.
 Measurement<2> no_sideslip(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& p_imu_vehicle);
+
+/// What the linear H of the vehicle's velocity leaves out while heading and velocity are uncertain: mean and variance
+/// of its second-order terms, per vehicle axis, under the errors' covariance P, (M.44).
+struct SecondOrder {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();      ///< m/s
+  Eigen::Vector3d variance = Eigen::Vector3d::Zero();  ///< (m/s)^2
+};
+SecondOrder bent_velocity(const NavState& x, const ErrorMatrix& P);
 
 /// Standing: velocity zero.
 Measurement<3> zero_velocity(const NavState& x, double sigma);

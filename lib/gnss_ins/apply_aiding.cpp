@@ -1,13 +1,20 @@
 #include "gnss_ins/apply_aiding.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "geometry/frames.h"
 #include "statistics/chi_square.h"
 
 namespace roadfix {
 
 namespace {
 
+// A heading this sure bends the velocity of a car at 30 m/s by a millimetre per second: not worth computing.
+constexpr double kSureHeading = 0.5 * kDegree;
+// What is left out is the same function of the same errors until fixes have changed these: a second, as they come.
+constexpr double kBentTime = 1.0;        // s
+constexpr double kLeastInterval = 0.01;  // s
 // Below this speed an unsigned wheel speed is not told apart from its negative.
 constexpr double kUnsignedMin = 0.3;  // m/s
 
@@ -16,6 +23,16 @@ AidingRecord not_ready(AidingSource source, int64_t t_us) {
   r.t_us = t_us;
   r.source = source;
   return r;
+}
+
+/// Takes into account what the linear H leaves out of one axis of the vehicle's velocity, used every `interval_s`,
+/// while the heading is unsure. `gain`: of the measurement by that velocity.
+void straighten(Measurement<1>& m, const InsCore& core, int axis, double gain, double interval_s) {
+  if (core.heading_std() < kSureHeading) return;
+  const SecondOrder bent = bent_velocity(core.state(), core.last_covariance());
+  const double rho = std::exp(-interval_s / kBentTime);
+  m.residual(0) -= gain * bent.mean(axis);
+  m.R(0, 0) += gain * gain * bent.variance(axis) * (1.0 + rho) / (1.0 - rho);  // Bartlett 1946
 }
 
 Measurement<3> position_of(const InsCore& core, const Pending& p, const Eigen::Vector3d& lever) {
@@ -104,6 +121,8 @@ AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates&
     speed = std::copysign(speed, predicted);
   }
   m.residual(0) += speed - p.value.x();
+  if (config_.aiding.use_second_order)
+    straighten(m, core, 0, 1.0 / (1.0 + x.wheel_scale), std::max(config_.aiding.wheel_interval, kLeastInterval));
   return core.fuse(AidingSource::kWheelSpeed, p.t_us, m, gates.nis[1]);
 }
 
@@ -126,10 +145,13 @@ AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& n
   m.residual(0) = both.residual(axis);
   m.H = both.H.row(axis);
   m.R(0, 0) = sigma * sigma;
+  if (config_.aiding.use_second_order)
+    straighten(m, core, 1 + axis, 1.0, axis == 0 ? config_.aiding.sideslip_interval : config_.aiding.heave_interval);
   const AidingRecord r = core.fuse(AidingSource::kNoSideslip, x.t_us, m, gate);
   if (learns && x.velocity.norm() > config_.sideslip.min_speed && r.status != AidingStatus::kBadInput)
-    noise.learn({m.residual(0), r.innovation_variance[0] - m.R(0, 0), m.R(0, 0), r.status == AidingStatus::kAccepted},
-                acceleration);
+    noise.learn(
+        {m.residual(0), r.innovation_variance[0] - sigma * sigma, sigma * sigma, r.status == AidingStatus::kAccepted},
+        acceleration);
   return r;
 }
 

@@ -66,6 +66,7 @@ struct AidingConfig {
   bool use_mag = true;
   bool use_error_correlation = true;  ///< of successive GNSS positions
   bool use_return_error = true;       ///< a receiver may come back from an outage displaced
+  bool use_second_order = true;       ///< of the vehicle's velocity, while its heading is unsure
 };
 
 /// The no-sideslip constraint's noise, one learner for each axis.
@@ -156,6 +157,7 @@ void visit(AidingConfig& c, Visitor& v) {
   v.boolean("use_mag", c.use_mag);
   v.boolean("use_error_correlation", c.use_error_correlation);
   v.boolean("use_return_error", c.use_return_error);
+  v.boolean("use_second_order", c.use_second_order);
 }
 
 template <class Visitor>

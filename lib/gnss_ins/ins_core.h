@@ -71,6 +71,8 @@ class InsCore {
   [[nodiscard]] OutputErrorMatrix output_covariance() const;  ///< likewise, of what an output needs
   /// rad, as of the last covariance step.
   [[nodiscard]] double heading_std() const { return std::sqrt(P_(kAtt + 2, kAtt + 2)); }
+  /// Of the errors, as of the last covariance step.
+  [[nodiscard]] const ErrorMatrix& last_covariance() const { return P_; }
   /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.
   [[nodiscard]] double longest_age() const;
   /// The receiver has come back from an outage: its fixes may be displaced by as much as sigma (m, enu), (M.37).

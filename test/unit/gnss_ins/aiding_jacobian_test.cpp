@@ -89,3 +89,46 @@ TEST_CASE("standing Jacobians") {
     return levelling(x, Eigen::Vector3d(0.0, 0.0, 9.8), Eigen::Vector3d(0.0, 0.0, -9.8), 0.1);
   });
 }
+
+TEST_CASE("what the linear velocity leaves out is what drawn errors show") {
+  constexpr int kDraws = 40'000;
+  test::RandomState random(5);
+  for (int trial = 0; trial < 4; ++trial) {
+    NavState x = random.state(0.3);
+    x.wheel_scale = x.no_slip_x = 0.0;
+    x.velocity = x.q_enu_imu * (x.R_imu_vehicle() * Eigen::Vector3d(9.0, 0.0, 0.0));
+    // Correlated errors of the velocity, the heading and the mounting's yaw.
+    Eigen::Matrix<double, kStates, 5> root = Eigen::Matrix<double, kStates, 5>::Zero();
+    for (int i = 0; i < 5; ++i) {
+      root.block<3, 1>(kVel, i) = random.vector(0.6);
+      root(kAtt + 2, i) = random.number(0.1);
+      root(kMounting + 1, i) = random.number(0.03);
+    }
+    const SecondOrder bent = bent_velocity(x, root * root.transpose());
+    const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+    const Measurement<1> ahead = wheel_speed(x, {}, 0.0, 1.0, 0.0, none);
+    const Measurement<2> across = no_sideslip(x, {}, none);
+    Eigen::Vector3d sum = none, squares = none;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      ErrorVector dx = ErrorVector::Zero();
+      for (int i = 0; i < 5; ++i) dx += random.number(1.0) * root.col(i);
+      const NavState y = retract(x, dx);
+      Eigen::Vector3d left;
+      left.x() = (ahead.residual - wheel_speed(y, {}, 0.0, 1.0, 0.0, none).residual - ahead.H * dx)(0);
+      left.tail<2>() = across.residual - no_sideslip(y, {}, none).residual - across.H * dx;
+      sum += left;
+      squares += left.cwiseAbs2();
+    }
+    const Eigen::Vector3d mean = sum / kDraws, variance = squares / kDraws - mean.cwiseAbs2();
+    CAPTURE(mean.transpose(), bent.mean.transpose(), variance.transpose(), bent.variance.transpose());
+    for (int axis = 0; axis < 3; ++axis) {
+      // Five sigmas of the drawn mean, and what the third and fourth order of the errors add.
+      const double slack = 5.0 * std::sqrt(variance(axis) / kDraws) + 0.02 * std::abs(bent.mean(0)) + 1e-9;
+      CHECK(std::abs(mean(axis) - bent.mean(axis)) < slack);
+      CHECK(std::abs(variance(axis) - bent.variance(axis)) < 0.25 * variance.x() + 1e-9);
+    }
+    // Teeth: without, or with the sign wrong, it would be another.
+    CHECK(std::abs(mean.x()) > 5.0 * std::sqrt(variance.x() / kDraws) + 0.1 * std::abs(bent.mean.x()));
+    CHECK(std::abs(mean.x() + bent.mean.x()) > 1.5 * std::abs(bent.mean.x()));
+  }
+}

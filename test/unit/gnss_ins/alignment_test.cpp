@@ -200,3 +200,79 @@ TEST_CASE("one position a second and an IMU askew are enough for a pose that kno
   CHECK(told.all_headings > 0.8);
   CHECK(untold.all_headings < 0.65);
 }
+
+namespace {
+
+/// What poses of a confirmed heading are worth, in the minute after starts in motion at walking pace and faster.
+struct Confirmed {
+  int starts = 0, wrong_ways = 0;   ///< confirmed more than 90 deg off
+  double known = 0.0, turns = 0.0;  ///< share of headings within three sigmas; their rms error, deg
+};
+
+Confirmed start_poorly(bool second_order, bool wheels) {
+  Confirmed out;
+  int poses = 0;
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    ScenarioConfig s = scenario("city_loop");
+    s.duration_s = 110.0;
+    s.gnss.rate_hz = 1.0;
+    s.gnss.fix_type = FixType::kSingle;
+    s.gnss.sigma_horizontal_m = 2.0;
+    s.gnss.sigma_up_m = 4.0;
+    s.gnss.sigma_velocity_mps = 0.0;
+    s.imu.mounting_std_rad = Eigen::Vector3d(0.0, 0.02, 5.0 * kDegree);
+    const SimulatedDrive drive = simulate(s, seed);
+    GnssInsConfig config = test::filter_config(s);
+    config.aiding.use_second_order = second_order;
+    for (const double from : {5.0, 12.0, 27.0, 46.0}) {
+      test::Samples samples(drive);
+      const int64_t start = samples.imu.front().t_us + static_cast<int64_t>(from * 1e6);
+      drop_before(samples.imu, start);
+      drop_before(samples.gnss, start);
+      drop_before(samples.wheels, start);
+      if (!wheels) samples.wheels.clear();
+      GnssIns filter(config);
+      int64_t next = start;
+      bool confirmed = false;
+      test::run(filter, samples, [&](GnssIns& f, int64_t now) {
+        f.clear_records();
+        if (now < next || seconds_between(start, now) > 60.0) return;
+        next += 500'000;
+        const GnssInsOutput o = f.output();
+        if (o.phase != AlignmentPhase::kDone) return;
+        const auto e = test::error_of(f, o.odometry, drive);
+        if (!confirmed) out.wrong_ways += std::abs(e(5)) > 0.5 * kPi;
+        confirmed = true;
+        ++poses;
+        out.known += e(5) * e(5) <= 9.0 * o.odometry.cov_pose(5, 5);
+        out.turns += e(5) * e(5);
+      });
+      ++out.starts;
+    }
+  }
+  out.known /= poses;
+  out.turns = std::sqrt(out.turns / poses) / kDegree;
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a heading that is confirmed from poor fixes is the right way round and as sure as it says") {
+  int wrong_if_linear = 0;
+  for (const bool wheels : {false, true}) {
+    const Confirmed seen = start_poorly(true, wheels), linear = start_poorly(false, wheels);
+    const auto print = [&](const char* name, const Confirmed& c) {
+      std::printf("%s, %s: %d starts, wrong way round %d, headings within three sigma %.3f, rms error %.2f deg\n", name,
+                  wheels ? "wheels" : "no wheels", c.starts, c.wrong_ways, c.known, c.turns);
+    };
+    print("second order", seen);
+    print("linear", linear);
+    CHECK(seen.wrong_ways == 0);
+    CHECK(seen.known > 0.95);
+    CHECK(seen.turns < 2.2);
+    // Teeth.
+    wrong_if_linear += linear.wrong_ways;
+    CHECK(linear.known < 0.85);
+  }
+  CHECK(wrong_if_linear >= 1);
+}
