@@ -191,40 +191,62 @@ size_t resident() {
   return pages * 4096;
 }
 
-TEST_CASE("half an hour keeps memory bounded", "[statistics]") {
+/// Half an hour at five pictures a second.
+struct HalfHour {
+  std::vector<size_t> states, residents;  ///< bytes, every two minutes
+  int frames = 0, valid = 0;              ///< since the car has moved in a lap: mono needs parallax
+};
+
+HalfHour half_hour(bool stereo) {
   constexpr int kLaps = 15;  // of two minutes each: every lap new tracks, and a restart where it begins
-  const test::TrackDrive d = test::make_track_drive(shortened("city_loop", 120.0), 7);
+  static const test::TrackDrive kDrive = test::make_track_drive(shortened("city_loop", 120.0), 7);
   KeyframeTrackerConfig config = exact_lens();
   config.close_loops = true;
   config.max_places = 50;
-  FedTracker tracker(config, d.drive.config);
-  std::vector<size_t> states, residents;
-  int frames = 0, valid = 0;
+  FedTracker tracker(config, kDrive.drive.config, stereo);
+  const Odometry begin = kDrive.drive.truth_at(kDrive.drive.config.start_utime);
+  HalfHour half;
   for (int lap = 0; lap < kLaps; ++lap) {
-    for (const auto& event : d.events) {
+    int count = 0;
+    bool under_way = false;
+    for (const auto& event : kDrive.events) {
       const auto* frame = std::get_if<test::TrackFrame>(&event);
-      if (frame == nullptr) continue;
+      if (frame == nullptr || ++count % 2 == 0) continue;
       std::vector<TrackObservation> tracks = frame->tracks;
       for (TrackObservation& o : tracks) o.id += 1'000'000'000LL * lap;
       const int64_t t_us = frame->t_us + 121'000'000LL * lap;
+      const Odometry truth = kDrive.truth(*frame);
+      if (!stereo) tracker->speed({t_us, SpeedSource::kWheels, truth.velocity.norm(), 0.05, 0.01});
       const TrackedFrame& out = tracker.process(t_us, tracks);
-      ++frames;
-      valid += out.odometry.validity == Validity::kValid ? 1 : 0;
+      under_way = under_way || (truth.T_frame_vehicle.p - begin.T_frame_vehicle.p).norm() > 5.0;
+      if (!under_way) continue;
+      ++half.frames;
+      half.valid += out.odometry.validity == Validity::kValid ? 1 : 0;
     }
     StateWriter writer;
     tracker->save(writer);
-    states.push_back(writer.take().size());
-    residents.push_back(resident());
-    const Odometry begin = d.drive.truth_at(d.drive.config.start_utime);
-    tracker->restart({d.drive.config.start_utime + 121'000'000LL * (lap + 1), begin.T_frame_vehicle, begin.velocity,
-                      1e-4 * Matrix6d::Identity()});
+    half.states.push_back(writer.take().size());
+    half.residents.push_back(resident());
+    tracker->restart({kDrive.drive.config.start_utime + 121'000'000LL * (lap + 1), begin.T_frame_vehicle,
+                      begin.velocity, 1e-4 * Matrix6d::Identity()});
   }
-  std::printf("half an hour: %d of %d frames valid, state %.2f MB after 4 min, %.2f after 30; resident %+.2f MB\n",
-              valid, frames, 1e-6 * static_cast<double>(states[1]), 1e-6 * static_cast<double>(states.back()),
-              1e-6 * (static_cast<double>(residents.back()) - static_cast<double>(residents[1])));
-  CHECK(valid > 0.99 * frames);
-  CHECK(10 * states.back() < 12 * *std::max_element(states.begin(), states.begin() + 3));
-  CHECK(static_cast<double>(residents.back()) < static_cast<double>(residents[1]) + 10e6);
+  return half;
+}
+
+TEST_CASE("half an hour keeps memory bounded", "[statistics]") {
+  for (const bool stereo : {true, false}) {
+    const HalfHour half = half_hour(stereo);
+    const auto mb = [](size_t bytes) { return 1e-6 * static_cast<double>(bytes); };
+    std::printf(
+        "half an hour, %s: %d of %d frames valid, state %.2f MB after 4 min, %.2f after 30; resident %+.2f MB\n",
+        stereo ? "stereo" : "mono", half.valid, half.frames, mb(half.states[1]), mb(half.states.back()),
+        mb(half.residents.back()) - mb(half.residents[1]));
+    CHECK(half.frames > 7500);
+    // These tracks die of old age where the car waits at a light, and mono gets no new points there.
+    CHECK(half.valid > (stereo ? 0.99 : 0.9) * half.frames);
+    CHECK(10 * half.states.back() < 12 * *std::max_element(half.states.begin(), half.states.begin() + 3));
+    CHECK(mb(half.residents.back()) < mb(half.residents[1]) + 10.0);
+  }
 }
 
 }  // namespace
