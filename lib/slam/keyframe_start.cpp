@@ -32,8 +32,9 @@ TrackState KeyframeTracker::without_map(int64_t t_us, bool able) {
 void KeyframeTracker::begin_map(int64_t t_us) {
   if (t_good_us_) {  // after a loss: the way that nobody saw is missing
     const double unseen_s = seconds_between(*t_good_us_, t_us);
-    const double unseen =
-        motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s * unseen_s : 0.0;
+    constexpr double kAcceleration = 1.0;  // m/s2: a car that is lost at a light drives on
+    const double speed = motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s : 0.0;
+    const double unseen = speed * unseen_s + 0.5 * kAcceleration * unseen_s * unseen_s;
     if (!found_back_) {
       cov_keyframe_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
       cov_closed_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;

@@ -198,6 +198,9 @@ class KeyframeTracker {
   [[nodiscard]] bool solve(const std::vector<Feature>& features, const SE3& T_predicted);
   void drop_wrong_tracks(const std::vector<Feature>& features);
   void learn_found_share();
+  [[nodiscard]] std::vector<double> flows_beyond(const Eigen::Quaterniond& q_now_keyframe,
+                                                 const std::vector<Feature>& features) const;
+  [[nodiscard]] bool hold(const CameraFrame& frame, const std::vector<Feature>& features);
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
   void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features);
   void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);

@@ -85,6 +85,51 @@ TEST_CASE("standing still among moving cars adds no drift") {
   CHECK(c.keyframes < 0.1 * c.frames);
 }
 
+/// The begin of city_loop with one eye; the car waits at a light for some seconds.
+struct RedLight {
+  int standing = 0, valid = 0;  ///< pictures
+  double moved = 0.0;           ///< m, at most, from the pose at which the car came to stand
+};
+
+RedLight red_light(double standing_flow_px) {
+  static const test::TrackDrive kDrive = [] {
+    TrackConfig tracks;
+    tracks.noise_px = 0.2;         // as above
+    tracks.loss_per_frame = 0.06;  // crossing traffic
+    return test::make_track_drive(shortened("city_loop", 45.0), 7, tracks);
+  }();
+  KeyframeTrackerConfig config = exact_lens();
+  config.standing_flow_px = standing_flow_px;
+  FedTracker tracker(config, kDrive.drive.config, false);
+  RedLight light;
+  std::optional<Eigen::Vector3d> stopped;
+  int count = 0;
+  for (const auto& event : kDrive.events) {
+    const auto* frame = std::get_if<test::TrackFrame>(&event);
+    if (frame == nullptr || ++count % 2 == 0) continue;
+    const double speed = kDrive.truth(*frame).velocity.norm();
+    tracker->speed({frame->t_us, SpeedSource::kWheels, speed, 0.05, 0.01});
+    const TrackedFrame& out = tracker.process(frame->t_us, frame->tracks);
+    const bool valid = out.odometry.validity == Validity::kValid;
+    if (count < 200 || speed > 0.01) continue;  // it stands at the begin, too
+    ++light.standing;
+    light.valid += valid ? 1 : 0;
+    if (!stopped) stopped = out.odometry.T_frame_vehicle.p;
+    if (valid) light.moved = std::max(light.moved, (out.odometry.T_frame_vehicle.p - *stopped).norm());
+  }
+  return light;
+}
+
+TEST_CASE("mono keeps its pose at a red light, where its landmarks come to an end") {
+  const RedLight held = red_light(KeyframeTrackerConfig{}.standing_flow_px), lost = red_light(0.0);
+  std::printf("red light: %d of %d pictures valid, moved %.3f m; %d where standing is not known\n", held.valid,
+              held.standing, held.moved, lost.valid);
+  CHECK(held.standing > 20);
+  CHECK(held.valid == held.standing);
+  CHECK(held.moved < 0.1);
+  CHECK(lost.valid < lost.standing);  // teeth
+}
+
 /// Drives into the dark; a restart at the true pose is given where `light_s` says, zero: never.
 struct Dark {
   std::optional<double> blind_s, lost_s;

@@ -1,0 +1,147 @@
+/// Keyframes: when one is made, what is taken into the map with it, and its adjustment, begun here and taken in before
+/// the next frame. And what holds the pose at a standstill that has left the map without landmarks.
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "slam/keyframe_tracker.h"
+#include "slam/pose_covariance.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kStandingShare = 0.4;   ///< of a keyframe's landmarks, below which one is made at a standstill too
+constexpr double kFoundMemory = 0.8;     ///< how much of the share found after keyframes stays from one to the next
+constexpr double kStandingDepth = 10.0;  ///< m, of what is seen: how far a car may have crept by so little flow
+
+}  // namespace
+
+/// Motion of tracks since the last keyframe beyond what turning by q_now_keyframe makes, px.
+std::vector<double> KeyframeTracker::flows_beyond(const Eigen::Quaterniond& q_now_keyframe,
+                                                  const std::vector<Feature>& features) const {
+  std::vector<double> flows;
+  for (const Feature& f : features) {
+    const Landmark* landmark = map_.find(f.track);
+    if (landmark == nullptr || landmark->sightings.empty()) continue;
+    const Sighting& seen = landmark->sightings.back();
+    const auto now = left_.unproject(f.pixel.cast<double>());
+    if (seen.keyframe != map_.last().id || !now) continue;
+    const Eigen::Vector3d turned = q_now_keyframe * seen.left.homogeneous();
+    flows.push_back(left_.focal() * (*now - turned.hnormalized()).norm());
+  }
+  return flows;
+}
+
+/// Descriptors find half of what there is already in the next picture, flow nearly all of it. What is lost then tells
+/// of the front end, only what is lost beyond it of the way.
+void KeyframeTracker::learn_found_share() {
+  if (!std::exchange(after_keyframe_, false) || landmarks_at_keyframe_ == 0) return;
+  const double found = std::min(1.0, static_cast<double>(out_.num_inliers) / landmarks_at_keyframe_);
+  found_share_ = kFoundMemory * found_share_ + (1.0 - kFoundMemory) * found;
+}
+
+bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const {
+  std::vector<double> flows = flows_beyond(T_map_camera_.q.conjugate() * map_.last().T_map_camera.q, features);
+  if (flows.empty()) return true;
+  const double mean = std::accumulate(flows.begin(), flows.end(), 0.0) / static_cast<double>(flows.size());
+  const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
+  std::nth_element(flows.begin(), middle, flows.end());
+  // Standing still tells nothing new, but what drives by covers tracks for good.
+  const bool standing = *middle < config_.standing_flow_px;
+  const double share = standing ? kStandingShare : config_.keyframe_min_share;
+  if (out_.num_inliers < share * found_share_ * landmarks_at_keyframe_) return true;
+  return !standing && mean > config_.keyframe_flow_px;
+}
+
+/// Without stereo no point is gained at a standstill, and what drives by covers those there are. That the picture
+/// stands still says where the camera is all the same.
+bool KeyframeTracker::hold(const CameraFrame& frame, const std::vector<Feature>& features) {
+  std::vector<double> flows = flows_beyond(Eigen::Quaterniond::Identity(), features);
+  if (static_cast<int>(flows.size()) < config_.weak_inliers) return false;
+  const bool few = static_cast<int>(flows.size()) < 2 * config_.weak_inliers;
+  const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
+  std::nth_element(flows.begin(), middle, flows.end());
+  if (*middle >= config_.standing_flow_px) return false;
+  const double turn = config_.standing_flow_px / left_.focal(), way = kStandingDepth * turn;
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(way * way), Eigen::Vector3d::Constant(turn * turn);
+  out_.state = TrackState::kWeak;
+  out_.reason = "standing, with few landmarks";
+  accept(frame.t_us, map_.last().T_map_camera, variances.asDiagonal());
+  if (few) make_keyframe(frame, features);
+  return true;
+}
+
+void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features) {
+  std::vector<Feature> all;
+  for (const Feature& f : features) {
+    if (pixels_.contains(f.track)) all.push_back(f);
+  }
+  for (const Feature& f : front_end_->replenish()) {
+    all.push_back(f);
+    pixels_[f.track] = f.pixel;
+    out_.features.push_back({f, FeatureUse::kNew});
+  }
+  std::vector<std::optional<Eigen::Vector2f>> right(all.size());
+  if (stereo_ && !frame.right.empty()) {
+    const SE3 T_camera_map = T_map_camera_.inverse();
+    std::vector<StereoQuery> queries;
+    for (const Feature& f : all) {
+      StereoQuery query{f.pixel, {}, f.track};
+      const Landmark* landmark = map_.find(f.track);
+      if (landmark != nullptr && landmark->p_map) {
+        const double depth = (T_camera_map * *landmark->p_map).z();
+        if (depth > kMinReprojectionDepth) query.depth = depth;
+      }
+      queries.push_back(query);
+    }
+    stereo_->turn(map_.lens().turned(rig_.T_right_left));
+    right = stereo_->match(frame.left, frame.right, queries);
+  }
+  std::vector<KeyframeFeature> seen;
+  const Camera right_lens(rig_.right.value_or(rig_.left));
+  for (size_t i = 0; i < all.size(); ++i) {
+    const auto normalised = left_.unproject(all[i].pixel.cast<double>());
+    if (!normalised) continue;
+    seen.push_back({all[i].track, *normalised, {}});
+    if (right[i]) seen.back().right = right_lens.unproject(right[i]->cast<double>());
+  }
+  const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}};
+  if (!map_.empty()) {
+    const SE3& T_map_before = map_.last().T_map_camera;
+    const SE3 T_before_now = T_map_before.inverse() * T_map_camera_;
+    cov_keyframe_ = carried(cov_keyframe_, T_map_before, T_before_now);
+    cov_closed_ = carried(cov_closed_, loops_.S_map_odom().rigid() * T_map_before, T_before_now);
+  }
+  map_.add_keyframe(keyframe, seen);
+  landmarks_at_keyframe_ = count_landmarks(seen);
+  after_keyframe_ = true;
+  begin_bundle();
+  remember_place(frame, all);
+}
+
+void KeyframeTracker::begin_bundle() {
+  job_ = std::make_unique<BundleJob>(map_.make_bundle([this](const Keyframe& a, const Keyframe& b) {
+    const auto known = stereo_ ? std::nullopt : camera_travelled(a.t_us, a.T_map_camera, b.t_us, b.T_map_camera);
+    return known ? std::optional(known->travel) : std::nullopt;
+  }));
+  BundleJob* job = job_.get();
+  const int iterations = config_.bundle_iterations;
+  executor_.start([job, iterations] { job->report = adjust(job->problem, iterations); });
+}
+
+void KeyframeTracker::finish_bundle() {
+  if (!job_) return;
+  executor_.wait();
+  const std::vector<int64_t> wrong = map_.apply(*job_);
+  front_end_->drop(wrong);
+  for (const int64_t track : wrong) pixels_.erase(track);
+  T_map_camera_ = map_.last().T_map_camera;  // the frame before this one was the job's last keyframe
+  const auto steps = static_cast<double>(std::max<size_t>(1, job_->keyframes.size() - 1));
+  const Matrix6d grown = job_->report.clustered_cov_last / steps;
+  cov_keyframe_ += grown;
+  cov_closed_ += in_map(grown, loops_.S_map_odom());
+  job_.reset();
+}
+
+}  // namespace roadfix
