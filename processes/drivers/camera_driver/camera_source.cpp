@@ -1,12 +1,14 @@
 // V4L2 cameras, video files and picture files, through OpenCV.
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <opencv2/videoio.hpp>
 #include <thread>
 
 #include "drivers/camera_driver/handler.h"
 #include "drivers/camera_driver/pnm.h"
+#include "drivers/device/threaded_source.h"
 
 namespace roadfix {
 
@@ -17,6 +19,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr double kFileRate_hz = 10.0;  // of picture files, which say none
 /// A camera that gives no picture for so many reads in a row is gone.
 constexpr int kMaxMisses = 3;
+/// OpenCV would wait ten seconds for each of them; it reads this from the environment, in whole seconds.
+constexpr const char* kSelectTimeout_s = "1";
 
 bool is_device(const std::string& name) { return name.starts_with("/dev/"); }
 
@@ -102,7 +106,10 @@ class CameraSource : public ByteSource {
 }  // namespace
 
 std::unique_ptr<ByteSource> open_cameras(const CameraDriverConfig& config, const std::function<int64_t()>& now_utime) {
-  return std::make_unique<CameraSource>(config, now_utime);
+  if (!is_device(config.devices.front())) return std::make_unique<CameraSource>(config, now_utime);
+  ::setenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", kSelectTimeout_s, 0);
+  const auto open = [&](const ThreadedSource::Now& now) { return std::make_unique<CameraSource>(config, now); };
+  return std::make_unique<ThreadedSource>(open, now_utime);
 }
 
 }  // namespace roadfix
