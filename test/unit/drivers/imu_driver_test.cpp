@@ -114,5 +114,90 @@ TEST_CASE("EKF_QUAT with EKF_NAV is a pose in east, north, up of the vehicle's a
   CHECK(m.cov_pose_m2_rad2[1][1] == Approx(0.01));
 }
 
+TEST_CASE("the fixes and poses of the SBG go on over the wrap of their stamps too") {
+  constexpr uint32_t kFirst = 4'294'000'000U;  // the counter of microseconds wraps in the fifth of ten epochs
+  std::vector<RawRead> reads;
+  for (uint32_t i = 0; i < 10; ++i) {
+    Bytes bytes = test::sbg_gps_bytes(kFirst + 200'000U * i, 200 * i);
+    test::append(bytes, test::sbg_solution_bytes(kFirst + 200'000U * i));
+    reads.push_back({kStart + 200'000 * int64_t{i}, bytes});
+  }
+  ImuDriverConfig c = config();
+  c.gnss_channel = "GNSS";
+  c.solution_channel = "REFERENCE";
+  ImuDriver driver(c);
+  const test::CollectedSensors sent = test::run_driver_over(driver, reads);
+  const auto fixes = sent.on<gnss_t>("GNSS");
+  const auto poses = sent.on<pose_t>("REFERENCE");
+  REQUIRE(fixes.size() == 10);
+  REQUIRE(poses.size() == 10);
+  for (std::size_t i = 1; i < 10; ++i) {
+    CHECK(fixes[i].utime - fixes[i - 1].utime == Approx(200'000).margin(200));
+    CHECK(poses[i].utime - poses[i - 1].utime == Approx(200'000).margin(200));
+  }
+}
+
+/// Everything that the driver can read, in turn, each log read when it was due.
+std::vector<RawRead> mixed_reads(uint32_t epochs) {
+  std::vector<RawRead> reads;
+  const auto add = [&](uint32_t t_us, const Bytes& bytes) { reads.push_back({kStart + int64_t{t_us}, bytes}); };
+  for (uint32_t t = 0; t < 200'000 * epochs; t += 200'000) {
+    for (uint32_t k = 0; k < 3; ++k) add(t + 5000 * k, test::sbg_imu_bytes(1'000'000 + t + 5000 * k));
+    add(t + 20'000, test::sbg_gps_bytes(1'020'000 + t, t / 1000));
+    add(t + 25'000, test::sbg_solution_bytes(1'025'000 + t));
+  }
+  return reads;
+}
+
+ImuDriverConfig all_channels() {
+  ImuDriverConfig c = config();
+  c.gnss_channel = "GNSS";
+  c.solution_channel = "REFERENCE";
+  return c;
+}
+
+TEST_CASE("SBG: however the stream is cut, the messages are the same") {
+  const std::vector<RawRead> reads = mixed_reads(2);
+  ImuDriver whole(all_channels());
+  const auto expected = test::run_driver_over(whole, reads).sent;
+  REQUIRE(expected.size() == 10);  // 6 samples, 2 fixes, 2 poses
+  for (std::size_t i = 0; i < reads.size(); ++i) {
+    for (std::size_t cut = 0; cut <= reads[i].bytes.size(); ++cut) {
+      std::vector<RawRead> pieces = reads;
+      const auto at = reads[i].bytes.begin() + static_cast<std::ptrdiff_t>(cut);
+      pieces[i].bytes.assign(reads[i].bytes.begin(), at);
+      pieces.insert(pieces.begin() + static_cast<std::ptrdiff_t>(i) + 1, {reads[i].utime, {at, reads[i].bytes.end()}});
+      ImuDriver driver(all_channels());
+      REQUIRE(test::run_driver_over(driver, pieces).sent == expected);
+    }
+  }
+}
+
+TEST_CASE("SBG: each byte that is wrong costs one frame, and a wrong checksum is counted") {
+  const std::vector<RawRead> reads = mixed_reads(1);
+  const auto sbg_row = [](const ImuDriver& driver) {
+    for (const StreamCounters& row : driver.counters())
+      if (row.name == "sbgECom") return row;
+    return StreamCounters{};
+  };
+  ImuDriver whole(all_channels());
+  static_cast<void>(test::run_driver_over(whole, reads));
+  REQUIRE(sbg_row(whole).received == 8);
+  int64_t wrong_checksums = 0, bytes = 0;
+  for (std::size_t i = 0; i < reads.size(); ++i) {
+    for (std::size_t at = 0; at < reads[i].bytes.size(); ++at) {
+      std::vector<RawRead> damaged = reads;
+      damaged[i].bytes[at] ^= 0x40U;
+      damaged.push_back({kStart + 300'000, Bytes(5000, 0)});  // longer than any frame: nobody waits for an end any more
+      ImuDriver driver(all_channels());
+      static_cast<void>(test::run_driver_over(driver, damaged));
+      REQUIRE(sbg_row(driver).received == 7);
+      wrong_checksums += sbg_row(driver).bad_checksum;
+      ++bytes;
+    }
+  }
+  CHECK(wrong_checksums > bytes / 2);  // the others hit a frame's head or its end
+}
+
 }  // namespace
 }  // namespace roadfix
