@@ -108,7 +108,7 @@ void put_verdict(Page& page, const HealthReport& report, int columns) {
   for (std::size_t i = 0; i < 5; ++i) page.line(" " + letters(words, i), colour);
 }
 
-void put_estimate(Page& page, const HealthReport& report) {
+void put_estimate(Page& page, const HealthReport& report, int columns) {
   const std::string since = duration(static_cast<double>(report.now_us - report.since_us) * 1e-6);
   for (const PoseReport& pose : report.poses) {
     if (pose.name != report.judged_pose) continue;
@@ -117,8 +117,12 @@ void put_estimate(Page& page, const HealthReport& report) {
                             pose.reason.empty() ? "" : ": " + pose.reason, since));
       return;
     }
-    page.line(fmt::format(" {} {}, sure to {:.2f} m and {:.1f} deg, {:.0f} km/h; this verdict for {}", pose.name,
-                          to_words(pose.validity), pose.position_std, pose.yaw_std / kDegree, pose.speed * 3.6, since));
+    const std::string place = fmt::format(" {} {}, sure to {:.2f} m and {:.1f} deg", pose.name, to_words(pose.validity),
+                                          pose.position_std, pose.yaw_std / kDegree);
+    const std::string rest = fmt::format(" {:.0f} km/h; this verdict for {}", pose.speed * 3.6, since);
+    const bool fits = static_cast<int>(place.size() + rest.size()) < columns;
+    page.line(fits ? place + "," + rest : place);
+    if (!fits) page.line(rest);
     return;
   }
   page.line(fmt::format(" no estimate; this verdict for {}", since));
@@ -194,7 +198,7 @@ std::string render_screen(const HealthReport& report, const ScreenSize& size, bo
       report.lag_s != 0.0 ? fmt::format(", a drive of {} ago", duration(std::abs(report.lag_s))) : std::string();
   page.line(fmt::format(" Roadfix {} UTC{}", clock_text(report.now_us), played), kDim);
   put_verdict(page, report, size.columns);
-  put_estimate(page, report);
+  put_estimate(page, report, size.columns);
   put_reasons(page, report);
   put_channels(page, report);
   put_processes(page, report);

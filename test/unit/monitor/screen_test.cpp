@@ -67,6 +67,7 @@ TEST_CASE("verdict in big letters where there is room, in words where there is n
   const std::string narrow = render_screen(some_report(Verdict::kDoNotUse), {40, 24}, false);
   CHECK_THAT(narrow, Catch::Contains("DO NOT USE"));
   CHECK_THAT(narrow, !Catch::Contains("█"));
+  CHECK_THAT(narrow, Catch::Contains("km/h; this verdict for"));  // in a line of its own
 }
 
 TEST_CASE("a pose that is none has no numbers") {
