@@ -35,6 +35,7 @@ Msckf::Msckf(const MsckfConfig& config)
       points_(config.window, config.vehicle.T_left_right),
       standing_(config.trust),
       stamps_(config.vehicle.camera_rate, config.vehicle.stamp_jitter),
+      clock_(config.vehicle),
       reason_("waiting for the imu") {
   state_.camera.T_imu_camera = config.vehicle.T_imu_camera;
   state_.camera.time_offset = config.vehicle.time_offset;
@@ -46,13 +47,26 @@ void Msckf::add(const SeenFrame& frame) {
   const int64_t t_us = stamps_.on_time(frame.t_us);
   frames_.push_back(frame);
   frames_.back().t_us = t_us;
+  if (const auto found = clock_.add(frames_.back())) settle_clock(*found);
+}
+
+void Msckf::settle_clock(const ClockSearch::Found& found) {
+  state_.camera.time_offset = found.offset;
+  planned_.reset();
+  if (phase_ != MsckfPhase::kRunning) return;
+  state_.forget(kTimeOffset, found.sigma);
+  while (!state_.landmarks.empty()) state_.remove_landmark(state_.landmarks.front().track);
+  while (!state_.clones.empty()) state_.remove_clone(state_.clones.front().id);
+  tracks_.clear();
 }
 
 void Msckf::add(const WheelSample& wheels) {
   if (wheels_.size() < kMaxWaiting) wheels_.push_back(wheels);
 }
 
-void Msckf::add_speed(int64_t t_us, double speed, double sigma) { known_speed_ = {t_us, speed, sigma}; }
+void Msckf::add_speed(int64_t t_us, double speed, double sigma) {
+  known_speed_ = {t_us, speed, sigma, MsckfScale::kIns};
+}
 
 int64_t Msckf::picture_us(const SeenFrame& frame) const { return frame.t_us + micros(state_.camera.time_offset); }
 
@@ -65,6 +79,7 @@ bool Msckf::advance(const ImuSample& imu) {
     if (phase_ == MsckfPhase::kRunning) lose("gap in the imu samples");
   }
   if (dt > 0.0 && dt <= kMaxGap_s) standing_.add(imu, dt);
+  clock_.add(imu);
   imu_.push_back(imu);
   follow(imu.t_us - lag_us_);
   const int64_t needed_us = phase_ == MsckfPhase::kRunning ? std::min(state_.imu.t_us, imu.t_us - micros(kKept_s))
@@ -157,7 +172,8 @@ void Msckf::use(const WheelSample& wheels) {
   if (!config_.aiding.use_wheels) return;
   const double speed = axle_speed(wheels);
   standing_.add_speed(wheels.t_us, speed);
-  wheel_speed_ = {wheels.t_us, speed, std::hypot(config_.vehicle.wheel_noise, config_.vehicle.wheel_scale_std * speed)};
+  wheel_speed_ = {wheels.t_us, speed, std::hypot(config_.vehicle.wheel_noise, config_.vehicle.wheel_scale_std * speed),
+                  MsckfScale::kWheels};
   if (phase_ != MsckfPhase::kRunning || wheels.t_us < state_.imu.t_us) return;
   propagate(wheels.t_us);
   use_vehicle(&wheels);
@@ -193,9 +209,9 @@ void Msckf::use_picture(const SeenFrame& frame) {
   clone_us_ = state_.imu.t_us;
   const ImuSample& now = *std::lower_bound(imu_.begin(), imu_.end() - 1, state_.imu.t_us,
                                            [](const ImuSample& s, int64_t t) { return s.t_us < t; });
-  state_.add_clone(
-      id, state_.imu.rate(now.gyro),
-      config_.vehicle.camera_rate > 0.0 ? kLineRest * config_.vehicle.stamp_jitter : config_.vehicle.stamp_jitter);
+  const double jitter =
+      config_.vehicle.camera_rate > 0.0 ? kLineRest * config_.vehicle.stamp_jitter : config_.vehicle.stamp_jitter;
+  state_.add_clone(id, state_.imu.rate(now.gyro), clock_.searching() ? std::hypot(jitter, clock_.sigma()) : jitter);
   points_.clear_counts();
   if (!points_.use_landmarks(state_, frame)) return lose("the filter broke");
   tracks_.add(frame, id);

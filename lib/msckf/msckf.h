@@ -9,11 +9,13 @@
 /// Same inputs in the same order give the same bits. One thread; memory is bounded.
 #pragma once
 
+#include <cmath>
 #include <deque>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "msckf/clock_search.h"
 #include "msckf/point_update.h"
 #include "msckf/propagation.h"
 #include "msckf/stamp_line.h"
@@ -70,6 +72,10 @@ class Msckf {
                                                           std::span<const ImuSample> ahead = {}) const;
   /// Nothing before the first start.
   [[nodiscard]] const msckf::State* state() const { return phase_ == MsckfPhase::kRunning ? &state_ : nullptr; }
+  /// s, standard deviation of the camera's time offset.
+  [[nodiscard]] double time_offset_std() const {
+    return clock_.searching() ? clock_.sigma() : std::sqrt(state_.P()(msckf::kTimeOffset, msckf::kTimeOffset));
+  }
   [[nodiscard]] const msckf::PointCounts& counts() const { return points_.counts(); }
   [[nodiscard]] const MsckfConfig& config() const { return config_; }
 
@@ -84,6 +90,7 @@ class Msckf {
   struct KnownSpeed {
     int64_t t_us = 0;
     double speed = 0.0, sigma = 0.0;
+    MsckfScale from = MsckfScale::kInertial;
   };
 
   struct Beginning {                                                             ///< of a start in motion
@@ -106,6 +113,8 @@ class Msckf {
   void use(const WheelSample& wheels);
   void use_picture(const msckf::SeenFrame& frame);
   void use_tracks(bool window_full);
+  /// The camera's clock is known from now on; what was seen before was seen at another moment than it was taken for.
+  void settle_clock(const msckf::ClockSearch::Found& found);
   void use_vehicle(const WheelSample* wheels);
   void use_standing();
   bool try_linear(msckf::Linear linear, double gate_sigma);
@@ -147,6 +156,7 @@ class Msckf {
   msckf::TrackStore tracks_;
   msckf::Standing standing_;
   msckf::StampLine stamps_;
+  msckf::ClockSearch clock_;
   std::deque<ImuSample> imu_;  ///< from the sample that contains the state's epoch on
   std::deque<msckf::SeenFrame> frames_;
   std::deque<WheelSample> wheels_;

@@ -27,7 +27,7 @@ constexpr int kPasses = 4;
 std::optional<Msckf::KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
   for (const std::optional<KnownSpeed>& s : {wheel_speed_, known_speed_})
     if (s && std::abs(seconds_between(s->t_us, t_us)) < kSpeedAge_s)
-      return KnownSpeed{s->t_us, s->speed, std::hypot(s->sigma, kStartAccel * seconds_between(s->t_us, t_us))};
+      return KnownSpeed{s->t_us, s->speed, std::hypot(s->sigma, kStartAccel * seconds_between(s->t_us, t_us)), s->from};
   // A turn tells it: lateral acceleration over yaw rate, as far as the road is level, (M.33).
   const ImuBlock& block = standing_.block();
   const double rate = block.gyro.z();
@@ -39,7 +39,7 @@ std::optional<Msckf::KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
   const double age = seconds_between(block.end_us, t_us) + 0.5 * config_.trust.block_s;
   const double sigma = std::hypot(told, kStartAccel * age);
   if (speed < kTurnSpeed || speed > config_.trust.max_speed || sigma > 0.5 * speed) return std::nullopt;
-  return KnownSpeed{t_us, speed, sigma};
+  return KnownSpeed{t_us, speed, sigma, MsckfScale::kInertial};
 }
 
 bool Msckf::plan_moving(int64_t t_us) {
@@ -61,7 +61,7 @@ bool Msckf::plan_moving(int64_t t_us) {
   plan.speed_std = known->sigma + 0.1;
   plan.side_std = 0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed);
   plan.tilt_std = std::hypot(0.1, kStartAccel / config_.vehicle.gravity) + block.accel_wander / config_.vehicle.gravity;
-  plan.scale = known->t_us == t_us ? MsckfScale::kInertial : MsckfScale::kWheels;
+  plan.scale = known->from;
   planned_ = plan;
   reason_ = "moving; the start is being measured";
   return true;

@@ -90,10 +90,19 @@ void Standing::serialise(Archive& a) {
 }
 
 template <class Archive>
+void ClockSearch::serialise(Archive& a) {
+  a(searching_, sigma_, until_search_, last_.t_us);
+  list(a, angles_, kMost, [&](Angle& angle) { a(angle.t_us, angle.angle); });
+  list(a, turns_, kMost, [&](Turn& turn) { a(turn.from_us, turn.to_us, turn.rate); });
+  list(a, last_.points, kMost, [&](SeenPoint& p) { point(a, p); });
+}
+
+template <class Archive>
 void Msckf::serialise(Archive& a) {
   state_.serialise(a);
   tracks_.serialise(a);
   standing_.serialise(a);
+  clock_.serialise(a);
   list(a, imu_, kMost, [&](ImuSample& s) { imu_sample(a, s); });
   list(a, frames_, kMost, [&](SeenFrame& f) {
     a(f.t_us);
@@ -105,7 +114,7 @@ void Msckf::serialise(Archive& a) {
     optional(a, w.yaw_rate, [&](double& rate) { a(rate); });
   });
   for (std::optional<KnownSpeed>* speed : {&known_speed_, &wheel_speed_})
-    optional(a, *speed, [&](KnownSpeed& s) { a(s.t_us, s.speed, s.sigma); });
+    optional(a, *speed, [&](KnownSpeed& s) { a(s.t_us, s.speed, s.sigma, s.from); });
   optional(a, planned_, [&](MovingStart& s) {
     a(s.t_us, s.length_us, s.at.up, s.at.v, s.at.gyro_bias, s.at.accel_bias, s.speed_std, s.side_std, s.tilt_std,
       s.scale);

@@ -96,7 +96,7 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
-  spec_.state_layout = 3;
+  spec_.state_layout = 4;
 }
 
 void MsckfStage::make_parts() {
@@ -199,7 +199,7 @@ void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
   status.num_map_points = out.num_landmarks;
   if (const msckf::State* state = filter_->state()) {
     status.time_offset_s = -state->camera.time_offset;
-    status.time_offset_std_s = std::sqrt(state->P()(msckf::kTimeOffset, msckf::kTimeOffset));
+    status.time_offset_std_s = filter_->time_offset_std();
   }
   outputs.publish(kStatus, status);
   vo_features_t features{};

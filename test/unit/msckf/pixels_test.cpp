@@ -18,10 +18,10 @@ constexpr int kDrives = 3;
 constexpr int kDegrees = 9;  // position, attitude, velocity at the end
 constexpr double kDuration = 25.0;
 constexpr int kWidth = 640, kHeight = 192;
-constexpr double kFalse_px = 4.0;    // from where the point is: a track of something else
-constexpr double kFast = 5.0;        // m/s
-constexpr double kFarthest = 200.0;  // m
-constexpr double kMostFalse = 0.12;  // share of new tracks; depth edges and moving cars count as false, too
+constexpr double kFalse_px = 4.0;     // from where the point is: a track of something else
+constexpr double kFast = 5.0;         // m/s
+constexpr double kFarthest = 200.0;   // m
+constexpr double kMostFalse = 0.12;   // share of new tracks; depth edges and moving cars count as false, too
 constexpr double kWithoutWay = 0.16;  // at least, where the turn alone says where to look
 constexpr double kTooBold = 8.0;
 
