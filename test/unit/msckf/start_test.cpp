@@ -84,3 +84,20 @@ TEST_CASE("the test of starts in turns sees sigmas that are too small") {
   CHECK(s.velocity / s.starts > 2.0);
   CHECK(s.later / s.starts > 2.0);
 }
+
+TEST_CASE("a start in motion says whose speed it took") {
+  test::VisualDriveConfig car = test::highway_drive(8.0);
+  car.scenario.motion.route = RouteKind::kColdStartMoving;
+  const test::VisualDrive drive = test::make_drive(car, 3);
+  for (const bool wheels : {false, true}) {
+    Msckf filter(test::filter_config(car));
+    std::optional<MsckfScale> first;
+    test::run(filter, drive, wheels, [&](const Msckf& f) {
+      const int64_t now = f.output().odometry.t_us;
+      if (!wheels && !first) filter.add_speed(now, drive.drive.truth_at(now).velocity.x(), 0.2);
+      if (!first && f.state() != nullptr) first = f.output().scale;
+    });
+    REQUIRE(first);
+    CHECK(*first == (wheels ? MsckfScale::kWheels : MsckfScale::kIns));
+  }
+}
