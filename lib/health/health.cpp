@@ -59,7 +59,13 @@ void Health::to_common_frame(PoseFacts& facts) {
 
 void Health::pose(const std::string& name, int64_t now_us, PoseFacts facts) {
   to_common_frame(facts);
-  poses_.try_emplace(name, name, config_.pose).first->second.seen(now_us, facts);
+  PoseWatch& watch = poses_.try_emplace(name, name, config_.pose).first->second;
+  if (watch.begins_anew(facts)) {
+    for (auto& [source, measurements] : sources_) {
+      if (source.starts_with(name + " in ")) measurements.begin_again();
+    }
+  }
+  watch.seen(now_us, facts);
 }
 
 void Health::measurement(const std::string& source, int64_t now_us, double nis, int dof, bool accepted) {

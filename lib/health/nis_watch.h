@@ -25,6 +25,11 @@ class NisWatch {
   NisWatch(const std::string& source, const ConsistencyLimits& limits) : source_(source), limits_(limits) {}
 
   void seen(int64_t now_us, double nis, int dof, bool accepted);
+  /// The source began anew (a map of its own, a reset): what it measured before is not held against it.
+  void begin_again() {
+    attempts_.clear();
+    fits_in_a_row_ = 0;
+  }
   void judge(int64_t now_us, std::vector<Condition>& out) const;
   [[nodiscard]] NisReport report(int64_t now_us) const;
 

@@ -47,6 +47,10 @@ class PoseWatch {
 
   /// `facts` in the frame that all absolute poses share (health/health.h sees to that).
   void seen(int64_t now_us, const PoseFacts& facts);
+  /// Whether `facts` is of another run or behind a reset: what was before says nothing of it.
+  [[nodiscard]] bool begins_anew(const PoseFacts& facts) const {
+    return newest_ && (newest_->run != facts.run || newest_->reset_counter != facts.reset_counter);
+  }
 
   /// `judged`: this is the estimate that the verdict is about.
   void judge(int64_t now_us, bool judged, std::vector<Condition>& out) const;

@@ -218,6 +218,29 @@ TEST_CASE("refusals are over once a source is used again, or has fallen silent; 
   CHECK(refused_until([](int i) { return i % 3 == 0; }) > 5.7);
 }
 
+TEST_CASE("refusals before a source's reset are not held against it; without a reset, or behind another's, they are") {
+  const auto told_until = [](const std::string& resets) {
+    SmallCar car;
+    car.tick = [&](double t) {
+      const int i = static_cast<int>(t * 100.0 + 0.5);
+      if (i % 10 != 0) return;
+      const bool refused = faulty(t) || (t >= kMended && i % 30 == 0);  // now and then afterwards too
+      car.health.measurement("POSE_INS in FUSION", test::at(t), refused ? 30.0 : 1.0, 3, !refused);
+    };
+    car.pose = [&](const std::string& name, double t, PoseFacts& facts) {
+      facts.reset_counter = name == resets && t >= kMended ? 1 : 0;
+    };
+    double last = 0.0;
+    car.drive(0.0, kMended + 5.0, [&](double t) {
+      if (car.reasons().find("refused.POSE_INS in FUSION") != std::string::npos) last = t;
+    });
+    return last;
+  };
+  CHECK(told_until("POSE_INS") < kMended + 0.45);
+  CHECK(told_until("") > kMended + 0.8);
+  CHECK(told_until("POSE_FUSED") > kMended + 0.8);
+}
+
 TEST_CASE("a source that fits again without being used is no longer told; one that errs now and then is") {
   // 10 Hz, on probation: nothing is used, and every fifth contradicts the estimate, until `fits_from_s`.
   const auto told_until = [](double fits_from_s) {
