@@ -17,39 +17,6 @@ constexpr double kSlightest = 1e-9;        ///< share of variance: rounding
 constexpr double kFixSpacing = 0.05;       ///< s: corrections closer than this belong to one fix
 constexpr double kWrongFor = 1.0;          ///< s: a position that is wrong by d may come with a speed wrong by d / this
 
-constexpr double kLeastLearnt = 1e-4;  ///< share of a variance: less is rounding
-
-/// What the estimator of `now` learnt since `before` (its pose and covariance carried to now by its own motion), as a
-/// measurement of its own (F.13b); never so sure that `e` would become surer than `now`.
-std::optional<FusionMeasurement<3>> learnt_pose(const PlanarEstimate& e, const PlanarEstimate& before,
-                                                const PlanarEstimate& now, double least_gain) {
-  const Eigen::LLT<Eigen::Matrix3d> llt(before.P);
-  if (llt.info() != Eigen::Success || !now.P.allFinite()) return std::nullopt;
-  const Eigen::Matrix3d L = llt.matrixL();
-  const Eigen::Matrix3d L_inverse = L.inverse();
-  const Eigen::Matrix3d whitened = L_inverse * now.P * L_inverse.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * (whitened + whitened.transpose()));
-  const Eigen::Matrix3d to_axes = solver.eigenvectors().transpose() * L_inverse;
-  const Eigen::Vector3d step = to_axes * difference_of(now.pose, before.pose);
-  const Eigen::Vector3d off = to_axes * difference_of(before.pose, e.pose);
-  FusionMeasurement<3> m;
-  bool gained = false;
-  for (int i = 0; i < 3; ++i) {
-    const double lambda = std::max(solver.eigenvalues()(i), 1e-12);
-    const double p = to_axes.row(i) * e.P * to_axes.row(i).transpose();
-    m.H.block<1, 3>(i, kPos) = to_axes.row(i);
-    if (lambda < 1.0 - kLeastLearnt && lambda < (1.0 - least_gain) * p) {
-      m.innovation(i) = off(i) + step(i) / (1.0 - lambda);
-      m.R(i, i) = std::max(lambda / (1.0 - lambda), p * lambda / (p - lambda));
-      gained = true;
-    } else {
-      m.R(i, i) = kUninformative;
-    }
-  }
-  if (!gained) return std::nullopt;
-  return m;
-}
-
 }  // namespace
 
 void Fusion::tell(const FusionInnovation<3>& innovation, const Eigen::Vector3d& difference,
@@ -92,16 +59,7 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
                              FusionChannelReport& report) {
   gain_height(s.odometry);
   if (!foreign_) return follow_ins(known, view, report);
-  const Memory& m = memory(FusionChannel::kIns);
-  std::optional<FusionMeasurement<3>> gain;
-  if (vision_speaks() && m.last && !refused_since_us_ && passes_needed_ == 0) {
-    const Planar motion = motion_of(FusionChannel::kIns, m.view, view);
-    const Eigen::Matrix3d carry = after_motion_by_start(m.view.pose, motion);
-    gain = learnt_pose(known, {after_motion(m.view.pose, motion), carry * m.view.P * carry.transpose()},
-                       {view.pose, view.P}, config_.least_gain);
-  } else {
-    gain = gained_pose(known, view.pose, view.P, config_.least_gain);
-  }
+  std::optional<FusionMeasurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
   now_ = combine(imm_);
