@@ -126,15 +126,16 @@ AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates&
   return core.fuse(AidingSource::kWheelSpeed, p.t_us, m, gates.nis[1]);
 }
 
-AidingRecord AidingApplier::sideslip(InsCore& core, const Gates& gates, bool learns) {
-  return hold_track(core, 0, lateral_, gates.nis[1], learns);
+AidingRecord AidingApplier::sideslip(InsCore& core, const Gates& gates, Beside beside) {
+  return hold_track(core, 0, lateral_, gates.nis[1], beside);
 }
 
-AidingRecord AidingApplier::heave(InsCore& core, const Gates& gates, bool learns) {
-  return hold_track(core, 1, vertical_, gates.nis[1], learns);
+AidingRecord AidingApplier::heave(InsCore& core, const Gates& gates, Beside beside) {
+  return hold_track(core, 1, vertical_, gates.nis[1], beside);
 }
 
-AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate, bool learns) const {
+AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate,
+                                       Beside beside) const {
   const NavState& x = core.state();
   const Measurement<2> both = no_sideslip(x, core.motion(), config_.vehicle.p_imu_vehicle);
   // Tyres slip with the lateral acceleration, springs give with any.
@@ -145,10 +146,11 @@ AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& n
   m.residual(0) = both.residual(axis);
   m.H = both.H.row(axis);
   m.R(0, 0) = sigma * sigma;
-  if (config_.aiding.use_second_order)
+  // Without fixes these errors stay as they are for much longer than kBentTime, and this is all that holds them.
+  if (beside != Beside::kNothing && config_.aiding.use_second_order)
     straighten(m, core, 1 + axis, 1.0, axis == 0 ? config_.aiding.sideslip_interval : config_.aiding.heave_interval);
   const AidingRecord r = core.fuse(AidingSource::kNoSideslip, x.t_us, m, gate);
-  if (learns && x.velocity.norm() > config_.sideslip.min_speed && r.status != AidingStatus::kBadInput)
+  if (beside == Beside::kFixes && x.velocity.norm() > config_.sideslip.min_speed && r.status != AidingStatus::kBadInput)
     noise.learn(
         {m.residual(0), r.innovation_variance[0] - sigma * sigma, sigma * sigma, r.status == AidingStatus::kAccepted},
         acceleration);

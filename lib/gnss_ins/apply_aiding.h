@@ -15,6 +15,10 @@ struct Gates {
   explicit Gates(double sigma);
 };
 
+/// What stands beside the no-sideslip constraint: it learns its noise from fixes alone, and its second-order terms
+/// (M.44) count while something changes the errors that they are of.
+enum class Beside { kSoughtHeading, kFixes, kNothing };
+
 class AidingApplier {
  public:
   explicit AidingApplier(const GnssInsConfig& config);
@@ -27,9 +31,8 @@ class AidingApplier {
   AidingRecord apply_level(InsCore& core, const Pending& p, const Gates& gates) const;
   AidingRecord apply_height(InsCore& core, const Pending& p, const Gates& gates) const;
 
-  /// Each learns its noise where `learns`.
-  AidingRecord sideslip(InsCore& core, const Gates& gates, bool learns);
-  AidingRecord heave(InsCore& core, const Gates& gates, bool learns);
+  AidingRecord sideslip(InsCore& core, const Gates& gates, Beside beside);
+  AidingRecord heave(InsCore& core, const Gates& gates, Beside beside);
   AidingRecord standing_velocity(InsCore& core, const Gates& gates) const;
   AidingRecord standing_rate(InsCore& core, const ImuBlock& block, const Gates& gates) const;
 
@@ -40,7 +43,7 @@ class AidingApplier {
   }
 
  private:
-  AidingRecord hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate, bool learns) const;
+  AidingRecord hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate, Beside beside) const;
   AidingRecord wheels(InsCore& core, const Pending& p, const Gates& gates) const;
 
   GnssInsConfig config_;

@@ -157,9 +157,10 @@ void GnssIns::step_aligned(const ImuSample& imu, bool block_done) {
   // Where wheel speeds come, the constraint joins them: one epoch of updates instead of two.
   if (wheels || seconds_between(wheels_at_us_, imu.t_us) > kWheelsSilent) {
     const bool shown = seconds_between(used_at_us_[0], imu.t_us) < kSideslipShown;
+    const Beside beside = shown ? Beside::kFixes : Beside::kNothing;
     if (due(next_sideslip_us_, imu.t_us, config_.aiding.sideslip_interval))
-      note(applier_.sideslip(core, gates_, shown), 0);
-    if (due(next_heave_us_, imu.t_us, config_.aiding.heave_interval)) note(applier_.heave(core, gates_, shown), 0);
+      note(applier_.sideslip(core, gates_, beside), 0);
+    if (due(next_heave_us_, imu.t_us, config_.aiding.heave_interval)) note(applier_.heave(core, gates_, beside), 0);
   }
   if (block_done && standing_now(core)) {
     note(applier_.standing_velocity(core, gates_), 0);

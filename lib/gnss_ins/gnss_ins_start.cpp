@@ -173,9 +173,9 @@ void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& nois
     note(bank_.aid([&](InsCore& core) { return applier_.apply(core, p, no_gates_); }), p.id);
   });
   if (due(next_sideslip_us_, imu.t_us, config_.aiding.sideslip_interval))
-    note(bank_.aid([&](InsCore& core) { return applier_.sideslip(core, no_gates_, false); }), 0);
+    note(bank_.aid([&](InsCore& core) { return applier_.sideslip(core, no_gates_, Beside::kSoughtHeading); }), 0);
   if (due(next_heave_us_, imu.t_us, config_.aiding.heave_interval))
-    note(bank_.aid([&](InsCore& core) { return applier_.heave(core, no_gates_, false); }), 0);
+    note(bank_.aid([&](InsCore& core) { return applier_.heave(core, no_gates_, Beside::kSoughtHeading); }), 0);
   if (block_done && standing_now(bank_.leader())) {
     note(bank_.aid([&](InsCore& core) { return applier_.standing_velocity(core, no_gates_); }), 0);
     note(bank_.aid([&](InsCore& core) { return applier_.standing_rate(core, monitor_.block(), no_gates_); }), 0);
