@@ -123,19 +123,25 @@ struct Askew {
   double level = 0.0, heading = 0.0, all_headings = 0.0;
 };
 
+/// A car whose receiver gives poor positions once a second and no velocity, and whose IMU sits askew.
+ScenarioConfig poor_start() {
+  ScenarioConfig s = scenario("city_loop");
+  s.duration_s = 110.0;
+  s.gnss.rate_hz = 1.0;
+  s.gnss.fix_type = FixType::kSingle;
+  s.gnss.sigma_horizontal_m = 2.0;
+  s.gnss.sigma_up_m = 4.0;
+  s.gnss.sigma_velocity_mps = 0.0;
+  s.imu.mounting_std_rad = Eigen::Vector3d(0.0, 0.02, 5.0 * kDegree);
+  return s;
+}
+
 Askew start_askew(double told_mounting_std) {
   constexpr double kLonger = 60.0;
   Askew out;
   int starts = 0, poses = 0, all_poses = 0;
   for (uint64_t seed = 1; seed <= 4; ++seed) {
-    ScenarioConfig s = scenario("city_loop");
-    s.duration_s = 110.0;
-    s.gnss.rate_hz = 1.0;
-    s.gnss.fix_type = FixType::kSingle;
-    s.gnss.sigma_horizontal_m = 2.0;
-    s.gnss.sigma_up_m = 4.0;
-    s.gnss.sigma_velocity_mps = 0.0;
-    s.imu.mounting_std_rad = Eigen::Vector3d(0.0, 0.02, 5.0 * kDegree);
+    const ScenarioConfig s = poor_start();
     const SimulatedDrive drive = simulate(s, seed);
     GnssInsConfig config = test::filter_config(s);
     config.vehicle.mounting_std.z() = told_mounting_std;
@@ -213,14 +219,7 @@ Confirmed start_poorly(bool second_order, bool wheels) {
   Confirmed out;
   int poses = 0;
   for (uint64_t seed = 1; seed <= 12; ++seed) {
-    ScenarioConfig s = scenario("city_loop");
-    s.duration_s = 110.0;
-    s.gnss.rate_hz = 1.0;
-    s.gnss.fix_type = FixType::kSingle;
-    s.gnss.sigma_horizontal_m = 2.0;
-    s.gnss.sigma_up_m = 4.0;
-    s.gnss.sigma_velocity_mps = 0.0;
-    s.imu.mounting_std_rad = Eigen::Vector3d(0.0, 0.02, 5.0 * kDegree);
+    const ScenarioConfig s = poor_start();
     const SimulatedDrive drive = simulate(s, seed);
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_second_order = second_order;
