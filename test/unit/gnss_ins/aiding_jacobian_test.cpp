@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "gnss_ins/aiding.h"
+#include "gnss_ins/apply_aiding.h"
 #include "random_state.h"
 #include "support/numerical_jacobian.h"
 
@@ -131,4 +132,22 @@ TEST_CASE("what the linear velocity leaves out is what drawn errors show") {
     CHECK(std::abs(mean.x()) > 5.0 * std::sqrt(variance.x() / kDraws) + 0.1 * std::abs(bent.mean.x()));
     CHECK(std::abs(mean.x() + bent.mean.x()) > 1.5 * std::abs(bent.mean.x()));
   }
+}
+
+TEST_CASE(
+    "in an outage the constraint's second-order terms do not count, beside fixes and while heading is sought they do") {
+  GnssInsConfig config;
+  GnssInsConfig linear = config;
+  linear.aiding.use_second_order = false;
+  test::RandomState random(5);
+  NavState x = random.state(0.0);
+  x.velocity = x.q_enu_imu * Eigen::Vector3d(10.0, 0.0, 0.0);
+  const auto variance = [&](const GnssInsConfig& used, Beside beside) {
+    InsCore core(used, Geodetic{0.84, 0.2, 500.0});
+    core.initialise(x, 0.01 * ErrorMatrix::Identity());  // 6 deg and 0.1 m/s among them
+    return AidingApplier(used).sideslip(core, Gates(5.0), beside).innovation_variance[0];
+  };
+  CHECK(variance(config, Beside::kNothing) == variance(linear, Beside::kNothing));
+  for (const Beside beside : {Beside::kFixes, Beside::kSoughtHeading})
+    CHECK(variance(config, beside) > 1.01 * variance(linear, beside));
 }
