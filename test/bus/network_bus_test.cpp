@@ -2,10 +2,8 @@
 // throws does not pass through LCM's C code.
 #include "bus/transport/network_bus.h"
 
-#include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdlib>
-#include <thread>
 
 using namespace roadfix;
 
@@ -61,7 +59,7 @@ TEST_CASE("what a handler throws comes out of handle(), and the bus goes on") {
 }
 
 TEST_CASE("a bus that cannot be opened or used says why") {
-  REQUIRE_THROWS_WITH(NetworkBus("udpm://239.255.76.67:port"), Catch::Contains("port: 'port'"));
+  REQUIRE_THROWS_WITH(NetworkBus("udpm://239.255.76.67:port"), Catch::Contains("no such port"));
   REQUIRE_THROWS_WITH(NetworkBus("nonsense://"), Catch::Contains("roadfix doctor"));
   NetworkBus bus(kUrl);
   REQUIRE_THROWS_AS(bus.publish("", std::vector<uint8_t>(3)), BusError);
@@ -83,54 +81,4 @@ TEST_CASE("a network that is gone costs the messages of that time, which are cou
   publish(from, "D", 4, 100);
   REQUIRE(handle_until(to, [&] { return seen.size() == 7; }));
   REQUIRE(from.unsent() == 6);
-}
-
-TEST_CASE("while a handler takes its time, what comes is kept, though the kernel's buffer holds little of it") {
-  NetworkBus from(kUrl), to(std::string(kUrl) + "&recv_buf_size=60000");
-  REQUIRE(from.receive_buffer_bytes() == 0);
-  int64_t handled = 0;
-  to.subscribe("E", [&](const BusMessage&) {
-    if (++handled != 1) return;
-    for (int i = 0; i < 40; ++i) {  // 160 kB and more of the kernel's memory
-      publish(from, "E", 5, 100);
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-  });
-  publish(from, "E", 1, 100);
-  REQUIRE(handle_until(to, [&] { return handled == 201; }));
-  REQUIRE(to.kernel_drops() == 0);
-  publish(from, "E", 3000, 100);  // teeth: faster than the keeper, it is too much
-  REQUIRE(to.kernel_drops() > 0);
-}
-
-TEST_CASE("a long message comes whole, and a channel only to who asked for its whole name") {
-  NetworkBus from(kUrl), to(kUrl);
-  std::vector<uint8_t> large(1'000'000);
-  for (std::size_t i = 0; i < large.size(); ++i) large[i] = static_cast<uint8_t>(i * 7919 >> 8);
-  std::vector<std::string> heard;
-  std::vector<uint8_t> seen;
-  to.subscribe("POSE_INS|IMU", [&](const BusMessage& message) { heard.emplace_back(message.channel); });
-  to.subscribe("PICTURE.*",
-               [&](const BusMessage& message) { seen.assign(message.bytes.begin(), message.bytes.end()); });
-  for (const char* channel : {"POSE_INS_2", "MY_IMU", "IMU", "POSE_INS"}) publish(from, channel, 1, 10);
-  from.publish("PICTURE_LEFT", large);
-  REQUIRE(handle_until(to, [&] { return !seen.empty(); }));
-  REQUIRE(seen == large);
-  REQUIRE(heard == std::vector<std::string>{"IMU", "POSE_INS"});
-}
-
-TEST_CASE("nothing to hear costs the patience and no more, whatever comes on channels that nobody asked for") {
-  NetworkBus from(kUrl), to(kUrl);
-  to.subscribe("F", [](const BusMessage&) {});
-  std::atomic<bool> done = false;
-  std::thread noise([&] {
-    while (!done) publish(from, "G", 100, 10);
-  });
-  const auto begin = std::chrono::steady_clock::now();
-  to.handle(std::chrono::milliseconds(200));
-  const auto took = std::chrono::steady_clock::now() - begin;
-  done = true;
-  noise.join();
-  REQUIRE(took >= std::chrono::milliseconds(195));
-  REQUIRE(took < std::chrono::seconds(5));
 }

@@ -9,8 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "bus/transport/bus_url.h"
-
 namespace roadfix {
 
 enum class Level { kOk, kWarning, kError };
@@ -21,6 +19,17 @@ struct Finding {
   std::string seen;   ///< what was found, in plain words
   std::string mend;   ///< a shell command; empty where nothing needs mending
 };
+
+/// What of an LCM URL matters here.
+struct BusUrl {
+  std::string group = "239.255.76.67";  ///< LCM's default
+  int port = 7667;
+  int ttl = 0;
+};
+
+/// Parses udpm://GROUP:PORT?ttl=N&...; throws std::invalid_argument that names the part. Other providers ("memq://",
+/// "file://") are no business of doctor's.
+BusUrl parse_bus_url(const std::string& url);
 
 /// The route that multicast takes, from ROOT/proc/net/route; an error where there is none (LCM then fails with "Network
 /// is unreachable").

@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include <charconv>
 #include <chrono>
 #include <fstream>
 #include <sstream>
+#include <stdexcept>
 
 #include "roadfix/doctor/doctor.h"
 
@@ -26,6 +28,14 @@ long read_number(const std::filesystem::path& file) {
   return in ? value : -1;
 }
 
+int parse_int(const std::string& text, const std::string& what) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw std::invalid_argument(fmt::format("{}: '{}' is no whole number", what, text));
+  return value;
+}
+
 Finding too_small(const std::string& name, long seen, long wanted, const std::string& why) {
   const std::string key = "net." + name;
   if (seen >= wanted) return {Level::kOk, key, std::to_string(seen), ""};
@@ -34,6 +44,32 @@ Finding too_small(const std::string& name, long seen, long wanted, const std::st
 }
 
 }  // namespace
+
+BusUrl parse_bus_url(const std::string& url) {
+  const std::string scheme = "udpm://";
+  if (url.rfind(scheme, 0) != 0)
+    throw std::invalid_argument(fmt::format("bus URL '{}': only udpm:// goes over a network", url));
+  BusUrl parsed;
+  const std::string rest = url.substr(scheme.size());
+  const std::size_t question = rest.find('?');
+  const std::string address = rest.substr(0, question);
+  if (!address.empty()) {
+    const std::size_t colon = address.find(':');
+    parsed.group = address.substr(0, colon);
+    if (colon != std::string::npos)
+      parsed.port = parse_int(address.substr(colon + 1), fmt::format("bus URL '{}', port", url));
+  }
+  in_addr group{};
+  if (inet_pton(AF_INET, parsed.group.c_str(), &group) != 1 || !IN_MULTICAST(ntohl(group.s_addr)))
+    throw std::invalid_argument(
+        fmt::format("bus URL '{}': '{}' is no multicast address (224.0.0.0 to 239.255.255.255)", url, parsed.group));
+  if (question == std::string::npos) return parsed;
+  std::istringstream arguments(rest.substr(question + 1));
+  for (std::string argument; std::getline(arguments, argument, '&');)
+    if (argument.rfind("ttl=", 0) == 0)
+      parsed.ttl = parse_int(argument.substr(4), fmt::format("bus URL '{}', ttl", url));
+  return parsed;
+}
 
 Finding check_route(const std::filesystem::path& root, const BusUrl& url) {
   in_addr group{};
