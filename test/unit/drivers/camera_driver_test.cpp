@@ -46,8 +46,8 @@ TEST_CASE("pictures from files: JPEG out, the same again from the raw ones, one 
 TEST_CASE("a video file is played at its own rate, and ends the driver") {
   const test::TemporaryFolder folder;
   const std::string path = (folder / "drive.avi").string();
-  constexpr int kPictures = 8;
-  constexpr double kRate_hz = 50.0;
+  constexpr int kPictures = 4;
+  constexpr double kRate_hz = 4.0;  // slower than what is taken where a file says none
   {
     cv::VideoWriter video(path, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), kRate_hz, cv::Size(64, 48));
     REQUIRE(video.isOpened());
@@ -56,14 +56,17 @@ TEST_CASE("a video file is played at its own rate, and ends the driver") {
   CameraDriverConfig config;
   config.devices = {path};
   config.publish_raw = true;
+  const auto begin = std::chrono::steady_clock::now();
   Bench bench(camera_driver_setup(config));
   REQUIRE(bench.step_until([&] { return !bench.more; }));
+  // A busy machine makes it longer, never shorter; between two stamps it may do either.
+  CHECK(std::chrono::steady_clock::now() - begin >= std::chrono::duration<double>((kPictures - 1) / kRate_hz));
   REQUIRE(bench.count("CAMERA_LEFT") == kPictures);
   const std::vector<Published> live = sensor_messages(bench);
   CHECK(replayed(bench) == live);
   const image_t first = decode<image_t>(live.front().bytes), last = decode<image_t>(live.back().bytes);
   CHECK(first.width_px == 64);
-  CHECK(static_cast<double>(last.utime - first.utime) > 0.9e6 * (kPictures - 1) / kRate_hz);
+  CHECK(last.utime > first.utime);
   const cv::Mat shown = cv::imdecode(last.data, cv::IMREAD_COLOR);
   CHECK(cv::norm(cv::mean(shown) - cv::Scalar(20 * (kPictures - 1), 100, 200 - 10 * (kPictures - 1))) < 5.0);
 }
