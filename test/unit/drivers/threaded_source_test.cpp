@@ -92,7 +92,8 @@ TEST_CASE("a source in a thread: all packets in order, stamped when they were re
   std::vector<Packet> packets;
   const int64_t begin = wall_us();
   while (packets.size() < 5) REQUIRE(source->read(milliseconds(1000), packets) == ReadState::kData);
-  std::this_thread::sleep_for(milliseconds(200));  // what waits now is old
+  CHECK(made->wait([&] { return made->reads >= static_cast<int>(packets.size()) + 4; }));  // as many as may wait
+  std::this_thread::sleep_for(milliseconds(200));                                          // what waits now is old
   const int64_t late = wall_us();
   made->set(made->lost, true);
   ReadState state = ReadState::kData;
