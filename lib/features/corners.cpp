@@ -50,7 +50,7 @@ class Occupancy {
 /// Smaller eigenvalue of the mean gradient matrix over 7 x 7 pixels; sums are integers, so that they are exact.
 float corner_score(const cv::Mat& gray, int u, int v) {
   constexpr int kHalf = 3;
-  int64_t xx = 0, xy = 0, yy = 0;
+  int xx = 0, xy = 0, yy = 0;  // 49 squares of 255 at most
   for (int r = v - kHalf; r <= v + kHalf; ++r) {
     const uint8_t* above = gray.ptr<uint8_t>(r - 1);
     const uint8_t* line = gray.ptr<uint8_t>(r);
@@ -63,8 +63,8 @@ float corner_score(const cv::Mat& gray, int u, int v) {
       yy += gy * gy;
     }
   }
-  const double trace = static_cast<double>(xx + yy), difference = static_cast<double>(xx - yy);
-  const double root = std::sqrt(difference * difference + 4.0 * static_cast<double>(xy) * static_cast<double>(xy));
+  const double trace = xx + yy, difference = xx - yy;
+  const double root = std::sqrt(difference * difference + 4.0 * xy * xy);
   constexpr double kScale = 0.5 / (4.0 * 49.0);  // half the trace; central differences span 2 px; 49 pixels
   return static_cast<float>(kScale * (trace - root));
 }
