@@ -55,9 +55,9 @@ ClockSearch::Fit ClockSearch::fit(double offset, size_t begin, size_t end) const
   std::vector<Eigen::Vector3d> imu, gap;
   for (size_t i = begin; i < end; ++i) {
     const Turn& t = turns_[i];
-    imu.push_back((angle_at(t.to_us + offset_us) - angle_at(t.from_us + offset_us)) /
-                  seconds_between(t.from_us, t.to_us));
-    gap.push_back(imu.back() - t.rate);
+    imu.emplace_back((angle_at(t.to_us + offset_us) - angle_at(t.from_us + offset_us)) /
+                     seconds_between(t.from_us, t.to_us));
+    gap.emplace_back(imu.back() - t.rate);
   }
   const auto weight = [](double square) { return 1.0 / (1.0 + square / (4.0 * kRateStd * kRateStd)); };
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();

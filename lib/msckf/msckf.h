@@ -50,6 +50,33 @@ struct MsckfOutput {
   double used_share = 1.0;  ///< of the points tried lately, those that fitted
 };
 
+namespace msckf {
+
+/// A speed over ground from elsewhere, for a start in motion.
+struct KnownSpeed {
+  int64_t t_us = 0;
+  double speed = 0.0, sigma = 0.0;  ///< m/s
+  MsckfScale from = MsckfScale::kInertial;
+};
+
+/// Where a start in motion begins.
+struct Beginning {
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), v = Eigen::Vector3d::Zero();  ///< imu axes
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
+  Calibrated camera;
+};
+
+/// A start in motion that is planned, and what is known of it.
+struct MovingStart {
+  int64_t t_us = 0;
+  int64_t length_us = 0;  ///< of what will be gone through
+  Beginning at;
+  double speed_std = 0.0, side_std = 0.0, tilt_std = 0.0;
+  MsckfScale scale = MsckfScale::kUnknown;
+};
+
+}  // namespace msckf
+
 class Msckf {
  public:
   explicit Msckf(const MsckfConfig& config);
@@ -87,25 +114,6 @@ class Msckf {
  private:
   static constexpr double kMaxGap_s = 0.5;  ///< of imu samples
 
-  struct KnownSpeed {
-    int64_t t_us = 0;
-    double speed = 0.0, sigma = 0.0;
-    MsckfScale from = MsckfScale::kInertial;
-  };
-
-  struct Beginning {                                                             ///< of a start in motion
-    Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), v = Eigen::Vector3d::Zero();  ///< imu axes
-    Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-    msckf::Calibrated camera;
-  };
-  struct MovingStart {  ///< what is known of it
-    int64_t t_us = 0;
-    int64_t length_us = 0;  ///< of what will be gone through
-    Beginning at;
-    double speed_std = 0.0, side_std = 0.0, tilt_std = 0.0;
-    MsckfScale scale = MsckfScale::kUnknown;
-  };
-
   void follow(int64_t until_us);
   void use_waiting(int64_t until_us);
   void propagate(int64_t t_us);
@@ -128,15 +136,15 @@ class Msckf {
   bool start_planned(int64_t until_us);
   [[nodiscard]] bool speed_known() const;
   /// Begins at `at` and uses what waits up to `end_us`; with `fixed`, linearised along the course that `at` gives.
-  void go_through(const MovingStart& plan, const Beginning& at, int64_t end_us, bool fixed);
-  void begin_moving(const MovingStart& plan, const Beginning& at);
+  void go_through(const msckf::MovingStart& plan, const msckf::Beginning& at, int64_t end_us, bool fixed);
+  void begin_moving(const msckf::MovingStart& plan, const msckf::Beginning& at);
   /// What the plan says of the errors of a state that begins at `at`.
-  [[nodiscard]] Eigen::Matrix<double, msckf::kBaseSize, 1> expected_errors(const MovingStart& plan) const;
+  [[nodiscard]] Eigen::Matrix<double, msckf::kBaseSize, 1> expected_errors(const msckf::MovingStart& plan) const;
   /// Where the state began, by what is known now.
-  [[nodiscard]] std::optional<Beginning> beginning(int64_t from_us) const;
+  [[nodiscard]] std::optional<msckf::Beginning> beginning(int64_t from_us) const;
   /// Integrates the imu's samples from there to now.
   void carry(msckf::ImuState& x, int64_t from_us) const;
-  [[nodiscard]] std::optional<KnownSpeed> speed_for_start(int64_t t_us) const;
+  [[nodiscard]] std::optional<msckf::KnownSpeed> speed_for_start(int64_t t_us) const;
   void begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen::Vector3d& v_imu, double v_std,
                 double tilt_std);
   void judge(int64_t t_us);
@@ -160,8 +168,8 @@ class Msckf {
   std::deque<ImuSample> imu_;  ///< from the sample that contains the state's epoch on
   std::deque<msckf::SeenFrame> frames_;
   std::deque<WheelSample> wheels_;
-  std::optional<KnownSpeed> known_speed_, wheel_speed_;
-  std::optional<MovingStart> planned_;
+  std::optional<msckf::KnownSpeed> known_speed_, wheel_speed_;
+  std::optional<msckf::MovingStart> planned_;
 
   MsckfPhase phase_ = MsckfPhase::kStarting;
   MsckfScale scale_ = MsckfScale::kUnknown;

@@ -24,7 +24,7 @@ constexpr int kPasses = 4;
 
 }  // namespace
 
-std::optional<Msckf::KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
+std::optional<KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
   for (const std::optional<KnownSpeed>& s : {wheel_speed_, known_speed_})
     if (s && std::abs(seconds_between(s->t_us, t_us)) < kSpeedAge_s)
       return KnownSpeed{s->t_us, s->speed, std::hypot(s->sigma, kStartAccel * seconds_between(s->t_us, t_us)), s->from};
@@ -138,7 +138,7 @@ Eigen::Matrix<double, kBaseSize, 1> Msckf::expected_errors(const MovingStart& pl
   return d;
 }
 
-std::optional<Msckf::Beginning> Msckf::beginning(int64_t from_us) const {
+std::optional<Beginning> Msckf::beginning(int64_t from_us) const {
   if (phase_ != MsckfPhase::kRunning) return std::nullopt;
   // The turn since then, then what the imu says was gained, by what is known now.
   ImuState x = state_.imu;
