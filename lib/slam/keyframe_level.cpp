@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "slam/keyframe_tracker.h"
+#include "slam/pose_covariance.h"
 
 namespace roadfix {
 namespace {
@@ -34,11 +35,12 @@ void KeyframeTracker::take_level() {
 void KeyframeTracker::turn_map(const Eigen::Quaterniond& q, double sigma) {
   const SE3 T_vehicle_left = rig_.T_vehicle_left, T_map_vehicle = T_map_camera_ * T_vehicle_left.inverse();
   const LevelTurn turn{q, T_map_vehicle.p, sigma};
-  map_.turn(turn);
+  map_.move(turn.transform());
   loops_.turn(turn);
   T_map_camera_ = turn.transform() * T_map_camera_;
   const SE3& T_known = map_.empty() ? T_map_camera_ : map_.last().T_map_camera;
   cov_keyframe_ = turn.covariance(cov_keyframe_, T_known);
+  cov_own_ = in_map(cov_own_, {q, {}, 1.0});
   cov_closed_ = turn.covariance(cov_closed_, loops_.S_map_odom().rigid() * T_known);
   levelled_ = true;
   attitudes_.clear();

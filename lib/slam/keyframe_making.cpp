@@ -111,6 +111,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
     const SE3& T_map_before = map_.last().T_map_camera;
     const SE3 T_before_now = T_map_before.inverse() * T_map_camera_;
     cov_keyframe_ = carried(cov_keyframe_, T_map_before, T_before_now);
+    cov_own_ = carried(cov_own_, T_map_before, T_before_now);
     cov_closed_ = carried(cov_closed_, loops_.S_map_odom().rigid() * T_map_before, T_before_now);
   }
   map_.add_keyframe(keyframe, seen);
@@ -140,6 +141,7 @@ void KeyframeTracker::finish_bundle() {
   const auto steps = static_cast<double>(std::max<size_t>(1, job_->keyframes.size() - 1));
   const Matrix6d grown = job_->report.clustered_cov_last / steps;
   cov_keyframe_ += grown;
+  cov_own_ += grown;
   cov_closed_ += in_map(grown, loops_.S_map_odom());
   job_.reset();
 }

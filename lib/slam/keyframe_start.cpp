@@ -7,8 +7,26 @@
 
 namespace roadfix {
 
+void KeyframeTracker::start(const CameraFrame& frame) {
+  if (stereo_ && !frame.right.empty()) {
+    find_back(frame);
+    start_stereo(frame);
+  } else {
+    start_mono(frame);
+  }
+}
+
+/// The picture that a map is lost in is the first of the next one.
+void KeyframeTracker::start_after(const std::string& loss, const CameraFrame& frame) {
+  out_.features.clear();
+  out_.num_matches = out_.num_landmarks_seen = out_.num_inliers = 0;
+  start(frame);
+  if (map_.empty()) out_.reason = loss;
+}
+
 void KeyframeTracker::start_stereo(const CameraFrame& frame) {
   std::vector<Feature> features = front_end_->track(frame.left, {});
+  cov_own_.setZero();
   make_keyframe(frame, features);
   if (landmarks_at_keyframe_ < config_.start_points) {
     out_.reason = "too few points in both pictures";
@@ -18,7 +36,9 @@ void KeyframeTracker::start_stereo(const CameraFrame& frame) {
     front_end_->reset();
     return;
   }
-  begin_map(frame.t_us);
+  constexpr double kToldSpeedStd = 1.0;  // m/s, of what came with a restart
+  const bool told = motion_ && !t_good_us_;
+  begin_map(frame.t_us, told ? motion_ : std::nullopt, kToldSpeedStd * kToldSpeedStd * Matrix6d::Identity());
 }
 
 /// Waiting for the car to move is initialising; before a bare wall or in the dark a tracker is lost, also one that has
@@ -29,8 +49,9 @@ TrackState KeyframeTracker::without_map(int64_t t_us, bool able) {
   return lost ? TrackState::kLost : TrackState::kInitialising;
 }
 
-void KeyframeTracker::begin_map(int64_t t_us) {
+void KeyframeTracker::begin_map(int64_t t_us, const std::optional<Motion>& motion, const Matrix6d& cov_motion) {
   if (t_good_us_) {  // after a loss: the way that nobody saw is missing
+    continuous_ = found_back_;
     const double unseen_s = seconds_between(*t_good_us_, t_us);
     constexpr double kAcceleration = 1.0;  // m/s2: a car that is lost at a light drives on
     const double speed = motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s : 0.0;
@@ -44,14 +65,15 @@ void KeyframeTracker::begin_map(int64_t t_us) {
     ++out_.closed_reset_counter;
     out_.closed_reset_delta = out_.reset_delta;
   }
-  motion_.reset();
+  motion_ = motion;
+  t_begun_us_ = t_us;
+  first_place_ = loops_.next_place();
   t_able_us_.reset();
   out_.map_began = true;
   out_.state = found_back_ ? TrackState::kRelocalised : TrackState::kGood;
   out_.reason = found_back_ ? "found back at a place seen before" : "";
   found_back_ = false;
-  accept(t_us, map_.last().T_map_camera, Matrix6d::Zero());
-  motion_.reset();
+  settle(t_us, map_.last().T_map_camera, Matrix6d::Zero(), cov_motion);
 }
 
 int KeyframeTracker::count_landmarks(const std::vector<KeyframeFeature>& features) const {
@@ -136,12 +158,14 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
         std::max(0.01, motion_->T_before_now.p.norm() / motion_->dt_s * seconds_between(start_->t_us, frame.t_us));
   }
   std::vector<KeyframeFeature> first, second;
+  pixels_.clear();
   std::vector<int64_t> wrong;
   auto used = out_.features.begin();  // in the order of the pairs
   for (size_t i = 0; i < pairs.tracks.size(); ++i) {
     while (used->feature.track != pairs.tracks[i]) ++used;
     used->use = motion->inlier[i] ? FeatureUse::kInlier : FeatureUse::kOutlier;
     if (motion->inlier[i]) {
+      pixels_[pairs.tracks[i]] = used->feature.pixel;
       first.push_back({pairs.tracks[i], pairs.first[i], {}});
       second.push_back({pairs.tracks[i], pairs.second[i], {}});
     } else {
@@ -150,15 +174,25 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   }
   map_.add_keyframe({0, start_->t_us, T_map_camera_, {}}, first);
   const SE3 T_map_second = T_map_camera_ * SE3{motion->T_first_second.q, baseline * motion->T_first_second.p};
-  map_.add_keyframe({0, frame.t_us, T_map_second, baseline}, second);
   front_end_->drop(wrong);
-  landmarks_at_keyframe_ = count_landmarks(second);
   out_.num_landmarks_seen = static_cast<int>(pairs.tracks.size());
   out_.num_inliers = static_cast<int>(first.size());
+  for (const Feature& f : front_end_->replenish()) {  // who comes into view now is wanted when the first ones leave it
+    out_.features.push_back({f, FeatureUse::kNew});
+    const auto normalised = left_.unproject(f.pixel.cast<double>());
+    if (!normalised) continue;
+    second.push_back({f.track, *normalised, {}});
+    pixels_[f.track] = f.pixel;
+  }
+  map_.add_keyframe({0, frame.t_us, T_map_second, baseline}, second);
+  landmarks_at_keyframe_ = count_landmarks(second);
+  cov_own_.setZero();
   begin_bundle();
   finish_bundle();
+  const Motion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_,
+                     seconds_between(start_->t_us, frame.t_us)};
   start_.reset();
-  begin_map(frame.t_us);
+  begin_map(frame.t_us, going, cov_own_);
 }
 
 }  // namespace roadfix

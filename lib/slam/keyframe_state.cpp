@@ -1,13 +1,17 @@
 /// What the tracker keeps between frames: restarts, speeds and the scale they give, saved states.
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/so3.h"
 #include "slam/keyframe_tracker.h"
+#include "slam/pose_covariance.h"
 #include "slam/state_io.h"
 
 namespace roadfix {
 namespace {
 
+/// Who asks for a restart may know of nothing younger than this (DESIGN.md, section 4: the largest lateness).
+constexpr int64_t kHearsay_us = 250'000;
 constexpr double kMinScaleWay = 3.0;  ///< m that a map without scale must have gone before speeds give it one
 
 /// Way of the camera when the vehicle has gone `way` along an arc and the camera turned and moved by T_begin_end, of
@@ -36,24 +40,40 @@ void KeyframeTracker::forget_map() {
 }
 
 void KeyframeTracker::restart(const Restart& restart) {
-  forget_map();
   restart_ = restart;
   restarted_ = levelled_ = true;  // the pose given is in whatever axes it is given in
-  continuous_ = found_back_ = false;
 }
 
-/// The first frame after a restart: the vehicle has moved on from the pose given.
+/// What was asked for at `given_us` was asked of what was known then. A map that has begun since goes on, and so does
+/// the first picture of one if it is no further from that time than now.
+std::optional<KeyframeTracker::Anchor> KeyframeTracker::anchor_near(int64_t given_us, int64_t now_us) const {
+  const auto away = [given_us](int64_t t_us) { return std::abs(t_us - given_us); };
+  if (map_.empty()) {
+    if (!start_ || away(start_->t_us) > away(now_us)) return std::nullopt;
+    return Anchor{start_->t_us, T_map_camera_};
+  }
+  if (*t_begun_us_ <= given_us - kHearsay_us) return std::nullopt;
+  const auto nearest =
+      std::min_element(map_.keyframes().begin(), map_.keyframes().end(),
+                       [&](const Keyframe& a, const Keyframe& b) { return away(a.t_us) < away(b.t_us); });
+  return Anchor{nearest->t_us, nearest->T_map_camera};
+}
+
+/// The first frame after a restart: the vehicle has moved on from the pose given, to here or to where something that is
+/// still tracked hangs on.
 void KeyframeTracker::arrive(int64_t t_us) {
-  restarted_ = false;
-  const double dt_s = std::max(0.0, seconds_between(restart_.t_us, t_us));
+  restarted_ = found_back_ = false;
+  auto anchor = anchor_near(restart_.t_us, t_us);
+  if (!anchor) {
+    forget_map();
+    anchor = Anchor{t_us, T_map_camera_};
+  }
+  const double dt_s = seconds_between(restart_.t_us, anchor->t_us);
   SE3 T_local_vehicle = restart_.T_local_vehicle;
   T_local_vehicle.p += dt_s * (T_local_vehicle.q * restart_.velocity);
-  const SE3 T_old_camera = T_map_camera_;
-  T_map_camera_ = T_local_vehicle * rig_.T_vehicle_left;
-  const SE3 T_old_vehicle = T_old_camera * rig_.T_vehicle_left.inverse();
-  out_.reset_delta = {T_old_vehicle.q.conjugate() * T_local_vehicle.q, T_local_vehicle.p - T_old_vehicle.p};
-  ++out_.reset_counter;
-  // Unseen turning and braking until here, as generous as the ramp of a street corner.
+  const SE3 T_local_anchor = T_local_vehicle * rig_.T_vehicle_left;
+  move_to(T_local_anchor * anchor->T_map_camera.inverse());
+  // Unseen turning and braking until there, as generous as the ramp of a street corner.
   constexpr double kTurnRate = 0.2;      // rad/s
   constexpr double kAcceleration = 1.0;  // m/s2
   Matrix6d cov = restart_.cov_pose;
@@ -64,13 +84,33 @@ void KeyframeTracker::arrive(int64_t t_us) {
   F.topRightCorner<3, 3>() = -T_local_vehicle.R() * skew(rig_.T_vehicle_left.p);
   F.bottomRightCorner<3, 3>() = rig_.T_vehicle_left.R().transpose();
   cov_keyframe_ = F * cov * F.transpose();
+  if (!map_.empty()) {
+    cov_keyframe_ =
+        carried(cov_keyframe_, T_local_anchor, T_local_anchor.inverse() * map_.last().T_map_camera) + cov_own_;
+  } else {
+    const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
+    motion_ = Motion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
+    continuous_ = false;
+    t_good_us_.reset();
+    t_able_us_.reset();
+  }
   cov_closed_ = cov_keyframe_;
-  ++out_.closed_reset_counter;
-  out_.closed_reset_delta = out_.reset_delta;
+}
+
+void KeyframeTracker::move_to(const SE3& T_new_old) {
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
-  motion_ = Motion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
-  t_good_us_.reset();
-  t_able_us_.reset();
+  const SE3 T_old_vehicle = T_map_camera_ * T_camera_vehicle;
+  T_map_camera_ = T_new_old * T_map_camera_;
+  if (!map_.empty()) {
+    map_.move(T_new_old);
+    loops_.move(first_place_, T_new_old);
+    cov_own_ = in_map(cov_own_, {T_new_old.q, {}, 1.0});
+  }
+  const SE3 T_new_vehicle = T_map_camera_ * T_camera_vehicle;
+  ++out_.reset_counter;
+  ++out_.closed_reset_counter;
+  out_.reset_delta =
+      out_.closed_reset_delta = {T_old_vehicle.q.conjugate() * T_new_vehicle.q, T_new_vehicle.p - T_old_vehicle.p};
 }
 
 void KeyframeTracker::take_speeds() {
@@ -175,7 +215,7 @@ void KeyframeTracker::members(Tracker& self, Archive& archive) {
           self.landmarks_at_keyframe_, self.found_share_, self.after_keyframe_);
   archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
           self.scale_std_, self.restarted_, self.restart_);
-  archive(self.new_levels_, self.attitudes_, self.levelled_);
+  archive(self.new_levels_, self.attitudes_, self.levelled_, self.cov_own_, self.t_begun_us_, self.first_place_);
 }
 
 void KeyframeTracker::save(StateWriter& writer) const {

@@ -17,6 +17,8 @@ namespace {
 /// are off by about this much (Cvisic et al., Recalibrating the KITTI dataset camera setup, 2021).
 constexpr double kStereoScaleStd = 0.01;
 
+constexpr double kUnknownSpeed = 30.0;  ///< m/s, standard deviation where there is a pose but no motion yet
+
 /// The motion `T` stretched in time by `factor`.
 SE3 stretched(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
 
@@ -92,14 +94,12 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   if (restarted_) arrive(frame.t_us);
   if (const std::string reason = unusable(frame); !reason.empty()) {
     miss(frame.t_us, reason);
-  } else if (!map_.empty()) {
+  } else if (map_.empty()) {
+    start(frame);
+  } else {
     take_scale();
     follow(frame);
-  } else if (stereo_ && !frame.right.empty()) {
-    find_back(frame);
-    start_stereo(frame);
-  } else {
-    start_mono(frame);
+    if (map_.empty()) start_after(std::string(out_.reason), frame);
   }
   t_us_ = frame.t_us;
   out_.scale = stereo_ ? ScaleSource::kStereo : scale_;
@@ -210,6 +210,12 @@ bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_p
 
 void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera) {
   if (t_us_) motion_ = Motion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
+  settle(t_us, T_map_camera, cov_camera, 2.0 * cov_camera);
+}
+
+/// With the motion that is already known, its covariance that of motion_.T_before_now, position in the map.
+void KeyframeTracker::settle(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera,
+                             const Matrix6d& cov_motion) {
   T_map_camera_ = T_map_camera;
   t_good_us_ = t_us;
   note_attitude(t_us);
@@ -224,13 +230,14 @@ void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix
   const Matrix6d cov_closed = carried(cov_closed_, T_closed_keyframe, T_keyframe_now) + in_map(cov_camera, S_map_odom);
   out_.cov_closed = vehicle_covariance(cov_closed, S_map_odom.rigid() * T_map_camera, T_camera_vehicle);
   o.validity = Validity::kValid;
+  o.cov_velocity = kUnknownSpeed * kUnknownSpeed * Eigen::Matrix3d::Identity();
   if (motion_ && motion_->dt_s > 0.0) {
     const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * T_camera_vehicle;
     o.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
     o.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
-    const Matrix6d cov_vehicle = vehicle_covariance(cov_camera, T_map_camera, T_camera_vehicle);
+    const Matrix6d cov_vehicle = vehicle_covariance(cov_motion, T_map_camera, T_camera_vehicle);
     const Eigen::Matrix3d R = o.T_frame_vehicle.R();
-    o.cov_velocity = 2.0 / (motion_->dt_s * motion_->dt_s) * R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R;
+    o.cov_velocity = R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s);
   }
 }
 

@@ -106,7 +106,8 @@ class KeyframeTracker {
   /// reset counter says so where there has been a pose.
   void level(const LevelSample& sample) { new_levels_.push_back(sample); }
 
-  /// Starts again at this pose: the map is forgotten, the next frame begins there.
+  /// Starts again at this pose, with the next frame. The map is forgotten; one that has begun since the time of the
+  /// pose is not what anybody complained of: it is moved there, and goes on.
   void restart(const Restart& restart);
 
   /// The next frame; an older or equal time is refused and changes nothing.
@@ -164,12 +165,14 @@ class KeyframeTracker {
   [[nodiscard]] std::string unusable(const CameraFrame& frame);
   void finish_bundle();
   void begin_bundle();
+  void start(const CameraFrame& frame);
+  void start_after(const std::string& loss, const CameraFrame& frame);
   void start_stereo(const CameraFrame& frame);
   void start_mono(const CameraFrame& frame);
   void wait_for_parallax(int64_t t_us, size_t points);
   void begin_start(const CameraFrame& frame, const std::vector<Feature>& features);
   void finish_start(const CameraFrame& frame, const Pairs& pairs);
-  void begin_map(int64_t t_us);
+  void begin_map(int64_t t_us, const std::optional<Motion>& motion, const Matrix6d& cov_motion);
   /// Way of the vehicle, with the source that knows it best; nothing where none does or none is wanted.
   struct KnownTravel {
     Travel travel;
@@ -186,9 +189,16 @@ class KeyframeTracker {
   void take_scale();
   void name_scale(const KnownTravel& known);
   void forget_map();
+  /// A pose of the camera that what is being tracked hangs on.
+  struct Anchor {
+    int64_t t_us = 0;
+    SE3 T_map_camera;
+  };
+  [[nodiscard]] std::optional<Anchor> anchor_near(int64_t given_us, int64_t now_us) const;
   /// Initialising or lost, where there is no map; `able`: this picture could begin one, or go on beginning one.
   [[nodiscard]] TrackState without_map(int64_t t_us, bool able);
   void arrive(int64_t t_us);
+  void move_to(const SE3& T_new_old);
   [[nodiscard]] int count_landmarks(const std::vector<KeyframeFeature>& features) const;
   void follow(const CameraFrame& frame);
   [[nodiscard]] SE3 predict(int64_t t_us) const;
@@ -208,6 +218,7 @@ class KeyframeTracker {
   [[nodiscard]] PlaceView view_of(const cv::Mat& gray, const std::vector<Feature>& features, int64_t t_us) const;
   void miss(int64_t t_us, const std::string& reason);
   void accept(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera);
+  void settle(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera, const Matrix6d& cov_motion);
 
   KeyframeTrackerConfig config_;
   CameraRig rig_;
@@ -229,10 +240,13 @@ class KeyframeTracker {
   double found_share_ = 1.0;     ///< of a keyframe's landmarks, in the picture after it: the front end's own, a mean
   bool after_keyframe_ = false;  ///< the last frame was made a keyframe
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
+  Matrix6d cov_own_ = Matrix6d::Zero();       ///< what of it this map has added
   Matrix6d cov_closed_ = Matrix6d::Zero();    ///< the same of the pose with all loops closed
   LoopCloser loops_;
-  bool continuous_ = false;  ///< no jump since the last place
-  bool found_back_ = false;  ///< the next map begins at a place known from before
+  std::optional<int64_t> t_begun_us_;  ///< when the map began
+  int64_t first_place_ = 0;            ///< of this map
+  bool continuous_ = false;            ///< no jump since the last place
+  bool found_back_ = false;            ///< the next map begins at a place known from before
   std::vector<SpeedSample> new_speeds_;
   TravelHistory wheels_, ins_;
   std::vector<LevelSample> new_levels_;

@@ -185,8 +185,7 @@ void LocalMap::rescale(double factor) {
   }
 }
 
-void LocalMap::turn(const LevelTurn& turn) {
-  const SE3 T = turn.transform();
+void LocalMap::move(const SE3& T) {
   for (Keyframe& k : keyframes_) k.T_map_camera = T * k.T_map_camera;
   for (auto& [track, landmark] : landmarks_) {
     if (landmark.p_map) landmark.p_map = T * *landmark.p_map;

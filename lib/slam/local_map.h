@@ -10,7 +10,6 @@
 
 #include "slam/bundle.h"
 #include "slam/config.h"
-#include "slam/level.h"
 #include "slam/travel.h"
 
 namespace roadfix {
@@ -80,7 +79,8 @@ class LocalMap {
 
   /// All lengths times `factor`, the camera of the last keyframe staying where it is.
   void rescale(double factor);
-  void turn(const LevelTurn& turn);
+  /// All of it, coordinates included.
+  void move(const SE3& T);
 
   void save(StateWriter& writer) const;
   void load(StateReader& reader);

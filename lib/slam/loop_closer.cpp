@@ -152,6 +152,14 @@ void LoopCloser::turn(const LevelTurn& turn) {
   S_map_odom_ = S * S_map_odom_ * S.inverse();
 }
 
+void LoopCloser::move(int64_t first, const SE3& T_odom_odom) {
+  const Sim3 S = S_map_odom_ * Sim3{T_odom_odom.q, T_odom_odom.p, 1.0} * S_map_odom_.inverse();
+  for (Place& place : places_) {
+    if (place.id >= first) place.S_map_camera = S * place.S_map_camera;
+  }
+  if (!places_.empty() && places_.back().id >= first) T_odom_last_ = T_odom_odom * T_odom_last_;
+}
+
 bool LoopCloser::visit(const PlaceView& view, bool continuous) {
   const auto found = recognise(view, next_id_ - kRecent, config_.with_scale);
   const int64_t id = next_id_;

@@ -46,11 +46,15 @@ class LoopCloser {
   /// The odometry's axes have been turned; the map's are too.
   void turn(const LevelTurn& turn);
 
+  /// The odometry since this place, and the place, have been moved in odom; the map before it stays.
+  void move(int64_t first, const SE3& T_odom_odom);
+
   [[nodiscard]] const Sim3& S_map_odom() const { return S_map_odom_; }
   /// Covariance of the camera's pose in map, right after a visit() that was true.
   [[nodiscard]] const Matrix6d& cov_after_loop() const { return places_.back().cov; }
   [[nodiscard]] int num_loops() const { return num_loops_; }
   [[nodiscard]] size_t num_places() const { return places_.size(); }
+  [[nodiscard]] int64_t next_place() const { return next_id_; }
 
   void save(StateWriter& writer) const;
   void load(StateReader& reader);

@@ -1,0 +1,180 @@
+/// How a map begins after a loss, and what a restart asked for meanwhile does to it.
+#include <catch2/catch.hpp>
+#include <cstdio>
+
+#include "geometry/determinism.h"
+#include "slam/keyframe_tracker.h"
+#include "support/street.h"
+
+namespace roadfix {
+namespace {
+
+const CameraIntrinsics kLens{480, 160, 280.0, 280.0, 240.0, 80.0, Distortion::kNone, {}};
+constexpr int kFrames = 36, kDark = 12, kLight = 18;  // the first dark frame, the first one after it
+constexpr int64_t kPeriod_us = 100'000;
+constexpr double kStep = 0.8;  // m a frame, straight ahead
+const Eigen::Vector3d kAhead{0.0, 0.0, 1.0};
+
+int64_t time_of(int frame) { return kPeriod_us * (frame + 1); }
+
+const std::vector<cv::Mat>& pictures() {
+  static const std::vector<cv::Mat> kPictures = [] {
+    fix_eigen_blocking();
+    fix_opencv_threads();
+    const test::Street street(3);
+    std::vector<cv::Mat> all;
+    for (int i = 0; i < kFrames; ++i) {
+      const SE3 T{Eigen::Quaterniond::Identity(), kStep * i * kAhead};
+      const bool dark = i >= kDark && i < kLight;
+      all.push_back(dark ? cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1)
+                         : street.picture(T, kLens, 1.0, static_cast<unsigned>(i + 1)));
+    }
+    return all;
+  }();
+  return kPictures;
+}
+
+/// A mono drive by pictures and wheels, frame by frame.
+class Drive {
+ public:
+  Drive() : tracker_(config(), rig(), make_front_end({}), executor_) {}
+
+  const TrackedFrame& frame(int i) {
+    tracker_.speed({time_of(i), SpeedSource::kWheels, 1e6 * kStep / kPeriod_us, 0.02, 0.01});
+    return tracker_.process({time_of(i), pictures()[static_cast<size_t>(i)], {}});
+  }
+  KeyframeTracker& operator*() { return tracker_; }
+
+ private:
+  static KeyframeTrackerConfig config() {
+    KeyframeTrackerConfig c;
+    c.close_loops = false;  // no place is known again: a new map is all there is
+    return c;
+  }
+  static CameraRig rig() {
+    CameraRig r;
+    r.left = kLens;
+    return r;
+  }
+
+  InlineExecutor executor_;
+  KeyframeTracker tracker_;
+};
+
+double way(const TrackedFrame& out) { return out.odometry.T_frame_vehicle.p.z(); }
+
+/// Drives into the dark and out of it; at frame `asked` the others ask for a restart at their pose of then,
+/// 100 m on, and the tracker hears of it half a second later.
+struct Restarted {
+  int begun = 0, invalid_after = 0;  ///< frames: where the map begins, how many have no pose from there on
+  double worst = 0.0;                ///< m, after the restart
+  int resets = 0;
+};
+
+Restarted restarted(int asked) {
+  constexpr double kGiven = 100.0;
+  constexpr int kHeard = 5;
+  Drive drive;
+  Restarted result;
+  for (int i = 0; i < kFrames; ++i) {
+    if (i == asked + kHeard) {
+      (*drive).restart({time_of(asked),
+                        {Eigen::Quaterniond::Identity(), (kGiven + kStep * asked) * kAhead},
+                        1e6 * kStep / kPeriod_us * kAhead,
+                        1e-4 * Matrix6d::Identity()});
+    }
+    const int resets_before = (*drive).last().reset_counter;
+    const TrackedFrame& out = drive.frame(i);
+    if (i < kLight) continue;
+    const bool valid = out.odometry.validity == Validity::kValid;
+    if (result.begun == 0 && valid) result.begun = i;
+    if (i == asked + kHeard) result.resets = out.reset_counter - resets_before;
+    if (result.begun == 0) continue;
+    result.invalid_after += valid ? 0 : 1;
+    if (i < asked + kHeard) continue;
+    if (valid) result.worst = std::max(result.worst, std::abs(way(out) - kGiven - kStep * i));
+  }
+  return result;
+}
+
+TEST_CASE("a restart asked for before the map began moves it, and it goes on") {
+  const Restarted known = restarted(19), waiting = restarted(14), accused = restarted(25);
+  std::printf("restart: map from frame %d and %d, %d and %d frames without a pose after it, %.2f and %.2f m\n",
+              known.begun, waiting.begun, known.invalid_after, accused.invalid_after, known.worst, waiting.worst);
+  CHECK(known.begun < 19 + 5);
+  CHECK(known.invalid_after == 0);
+  CHECK(known.worst < 0.1);
+  // Told while a map is being begun: no later for it.
+  CHECK(waiting.begun == known.begun);
+  CHECK(waiting.invalid_after == 0);
+  CHECK(waiting.worst < 0.1);
+  // Asked for when the map has been known for long: that map is meant, and forgotten.
+  CHECK(accused.begun == known.begun);
+  CHECK(accused.invalid_after > 0);
+  CHECK(accused.worst < 0.1);
+  for (const Restarted& r : {known, waiting, accused}) CHECK(r.resets == 1);
+}
+
+TEST_CASE("mono's first pose goes as fast as its two pictures say, and sees beyond them") {
+  Drive drive;
+  int begun = 0;
+  while ((*drive).last().odometry.validity != Validity::kValid) (void)drive.frame(begun++);
+  const TrackedFrame first = (*drive).last();
+  CHECK(first.map_began);
+  CHECK(first.odometry.velocity.z() == Approx(8.0).epsilon(0.05));
+  const double sigma = std::sqrt(first.odometry.cov_velocity(2, 2));
+  CHECK(sigma > 0.0);
+  CHECK(sigma < 1.0);
+  CHECK((*drive).at(first.odometry.t_us + kPeriod_us / 2).T_frame_vehicle.p.z() ==
+        Approx(way(first) + 0.5 * kStep).margin(0.05));
+  const auto fresh = std::count_if(first.features.begin(), first.features.end(),
+                                   [](const UsedFeature& f) { return f.use == FeatureUse::kNew; });
+  CHECK(fresh > 20);
+  const TrackedFrame& second = drive.frame(begun);
+  CHECK(second.num_matches > first.num_inliers);
+  CHECK(second.num_inliers > 0.7 * second.num_landmarks_seen);
+  CHECK(second.odometry.velocity.z() == Approx(8.0).epsilon(0.05));
+}
+
+TEST_CASE("nobody knows how fast stereo's first pose goes, and it says so") {
+  CameraRig rig;
+  rig.left = kLens;
+  rig.right = kLens;
+  rig.T_right_left.p.x() = -0.5;
+  InlineExecutor executor;
+  KeyframeTracker tracker({}, rig, make_front_end({}), executor);
+  const test::Street street(3);
+  const auto show = [&](int i) {
+    const SE3 T{Eigen::Quaterniond::Identity(), kStep * i * kAhead};
+    tracker.process(
+        {time_of(i), street.picture(T, kLens, 1.0, 1), street.picture(T * rig.T_right_left.inverse(), kLens, 1.0, 2)});
+    return tracker.last().odometry;
+  };
+  const Odometry first = show(0), second = show(1);
+  CHECK(first.validity == Validity::kValid);
+  CHECK(first.velocity.norm() == 0.0);
+  CHECK(std::sqrt(first.cov_velocity(2, 2)) > 8.0);
+  CHECK(second.velocity.z() == Approx(8.0).epsilon(0.05));
+  CHECK(std::sqrt(second.cov_velocity(2, 2)) < 1.0);
+}
+
+TEST_CASE("the picture that a map is lost in is the first of the next one") {
+  Drive drive;
+  for (int i = 0; i < kDark; ++i) (void)drive.frame(i);
+  CHECK((*drive).last().state == TrackState::kGood);
+  const test::Street elsewhere(7);
+  int i = kDark;
+  do {
+    const SE3 T{Eigen::Quaterniond::Identity(), kStep * i * kAhead};
+    (*drive).process({time_of(i), elsewhere.picture(T, kLens, 1.0, static_cast<unsigned>(i)), {}});
+  } while ((*drive).last().state != TrackState::kLost && ++i < kFrames);
+  const TrackedFrame& lost = (*drive).last();
+  CHECK(lost.state == TrackState::kLost);
+  CHECK(lost.reason == "too few landmarks agree on a pose");
+  CHECK(lost.features.size() > 60);
+  CHECK(std::all_of(lost.features.begin(), lost.features.end(),
+                    [](const UsedFeature& f) { return f.use == FeatureUse::kNew; }));
+}
+
+}  // namespace
+}  // namespace roadfix
