@@ -182,7 +182,7 @@ class Fusion {
   FuseStatus fuse_odometry(FusionChannel channel, const Planar& motion, double dt, const Eigen::Matrix3d& R,
                            bool with_yaw, FusionChannelReport& report);
   [[nodiscard]] Eigen::Matrix3d jitter(FusionChannel c) const;
-  void fuse_rates(const ChannelSample& sample, const LevelView& view, bool told_turn);
+  void fuse_rates(const ChannelSample& sample, const LevelView& view, bool told);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
                        FusionChannelReport& report);
   FuseStatus follow_ins(const PlanarEstimate& known, const LevelView& view, FusionChannelReport& report);

@@ -27,28 +27,22 @@ void Fusion::tell(const FusionInnovation<3>& innovation, const Eigen::Vector3d& 
   report.innovation_variance = innovation.variance;
 }
 
-/// Speed and yaw rate: of the INS, or while it is silent of who is there.
-void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view, bool told_turn) {
+/// Speed and yaw rate: of the INS, or while it is silent of who is there, unless its motion has told them.
+void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view, bool told) {
+  if (told) return;
   if (s.channel != FusionChannel::kIns && alive(FusionChannel::kIns)) return;
   if (s.channel == FusionChannel::kVo && !agreement_.agrees) return;
-  std::array<double, kModes> told{};
-  for (std::size_t i = 0; i < kModes; ++i) told[i] = imm_.modes[i].log_likelihood;
-  if (!told_turn)
-    update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
+  std::array<double, kModes> likely{};
+  for (std::size_t i = 0; i < kModes; ++i) likely[i] = imm_.modes[i].log_likelihood;
+  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
   if (s.channel == FusionChannel::kIns && memory(s.channel).last) {  // the motion has told the turn already
-    for (std::size_t i = 0; i < kModes; ++i) imm_.modes[i].log_likelihood = told[i];
+    for (std::size_t i = 0; i < kModes; ++i) imm_.modes[i].log_likelihood = likely[i];
   }
   if (!s.metric) return;
   const double lasting = s.channel == FusionChannel::kIns ? 0.0 : s.odometry.cov_velocity(0, 0);
   const double variance = lasting + config_.speed_sigma * config_.speed_sigma;
-  update<1>([&](const Vector& x) {
-    FusionMeasurement<1> m = absolute_component(x, kSpeed, s.odometry.velocity.x(), std::sqrt(variance));
-    if (s.channel != FusionChannel::kIns) return m;
-    const Eigen::RowVector2d along(std::cos(x(kYaw)), std::sin(x(kYaw)));
-    m.H.block<1, 2>(0, kInsVelocity) = along;
-    m.innovation(0) -= along.dot(x.segment<2>(kInsVelocity));
-    return m;
-  });
+  const ChannelSlots where = slots(s.channel);
+  update<1>([&](const Vector& x) { return channel_speed(x, where, s.odometry.velocity.x(), variance); });
 }
 
 bool Fusion::vision_speaks() const {

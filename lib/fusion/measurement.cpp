@@ -49,6 +49,21 @@ FusionMeasurement<1> absolute_component(const Vector& x, int index, double value
   return m;
 }
 
+FusionMeasurement<1> channel_speed(const Vector& x, const ChannelSlots& slots, double speed, double variance) {
+  const double length = length_factor(x, slots);
+  FusionMeasurement<1> m;
+  m.H(0, kSpeed) = length;
+  m.innovation(0) = speed - length * x(kSpeed);
+  if (slots.scale) m.H(0, *slots.scale) = length * x(kSpeed);
+  if (slots.velocity) {
+    const Eigen::RowVector2d along(std::cos(x(kYaw)), std::sin(x(kYaw)));
+    m.H.block<1, 2>(0, *slots.velocity) = along;
+    m.innovation(0) -= along.dot(x.segment<2>(*slots.velocity));
+  }
+  m.R(0, 0) = variance;
+  return m;
+}
+
 Planar predicted_motion(const Vector& x, const ChannelSlots& slots, double dt) {
   Planar m = motion_between(x.segment<3>(slots.clone), seen(x, slots, dt));
   m.head<2>() *= length_factor(x, slots);
@@ -123,8 +138,13 @@ void carry_clone(FusionEstimate& e, const ChannelSlots& slots, const Planar& mot
   told.head<2>() /= length;
   if (slots.drift) told.z() -= dt * e.x(*slots.drift);
   const Planar next = after_motion(start, told);
-  const Eigen::Vector2d way = (next - start).head<2>();
-  const Eigen::Matrix3d A = after_motion_by_start(start, told);
+  // The Jacobian's way is the speed's, not the measured one: that has the picture's error, which the innovation has
+  // too, so that pictures would always say that lengths are shorter (MODEL.md, section 4).
+  const double heading = start.z() + 0.5 * told.z();
+  const Eigen::Vector2d way = dt * e.x(kSpeed) * Eigen::Vector2d(std::cos(heading), std::sin(heading));
+  Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
+  A(0, 2) = -way.y();
+  A(1, 2) = way.x();
   Eigen::Matrix<double, 3, kSize> rows = A.lazyProduct(e.P.middleRows<3>(c));  // cov(next, x)
   if (slots.scale) rows.topRows<2>() -= way * e.P.row(*slots.scale);
   if (slots.drift) rows.row(2) -= dt * e.P.row(*slots.drift);

@@ -37,6 +37,9 @@ FusionMeasurement<3> absolute_pose(const fusion::Vector& x, const Planar& pose, 
 /// Paper C (5), (6) of one component.
 FusionMeasurement<1> absolute_component(const fusion::Vector& x, int index, double value, double sigma);
 
+/// The channel's speed along the vehicle's x: with its scale, as its ways, or with its velocity error.
+FusionMeasurement<1> channel_speed(const fusion::Vector& x, const ChannelSlots& slots, double speed, double variance);
+
 /// Motion that the state predicts since the clone, as the channel would measure it over dt (F.10).
 Planar predicted_motion(const fusion::Vector& x, const ChannelSlots& slots, double dt);
 

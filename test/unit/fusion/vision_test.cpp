@@ -204,6 +204,35 @@ TEST_CASE("a gyro bias of the vision is learnt while GNSS is good") {
   CHECK(std::abs(closed.second - closed.first) > 0.5 * std::abs(drift));  // teeth
 }
 
+/// What the fusion takes for the log scale of a vision, of which alone it hears, and whose velocities are longer than
+/// its motion by `faster`; beside an INS if `with_ins`, where the lengths are too long by `longer`.
+double scale_learnt(double faster, double longer, bool with_ins) {
+  Tunnel t;
+  t.ins.outages.clear();
+  t.ins.velocity_walk = 0.005;
+  t.vo.scale_std = 0.0;
+  t.vo.fault = [&](double, Planar& motion) {
+    motion.head<2>() *= longer;
+    return true;
+  };
+  std::vector<StreamEvent> vision = vo_stream(t.drive, t.vo, 5);
+  for (StreamEvent& e : vision) e.sample.odometry.velocity *= faster;
+  std::vector<std::vector<StreamEvent>> streams{vision};
+  if (with_ins) streams.push_back(ins_stream(t.drive, t.ins, 1));
+  Fusion fusion({});
+  run(fusion, merged(streams), [](const Fusion&, const StreamEvent&) {});
+  return fusion.estimate().x(kVoScale);
+}
+
+TEST_CASE("a vision alone learns no scale from itself, whatever its velocities say") {
+  for (const double faster : {1.0, 0.85}) {
+    INFO("velocities by " << faster << ": " << scale_learnt(faster, 1.0, false));
+    CHECK(std::abs(scale_learnt(faster, 1.0, false)) < 0.03);  // its own sigma before anybody has told
+  }
+  INFO("beside an INS: " << scale_learnt(1.0, 1.05, true));
+  CHECK(std::abs(scale_learnt(1.0, 1.05, true) - std::log(1.05)) < 0.01);  // teeth: who can tell it teaches it
+}
+
 /// In the tunnel a vision drives off from 50 s, tells nothing from 52 s to 53 s, and goes on from there in a new map
 /// (`reset`) whose lengths are wrong by `scaled`; again nothing from 58 s to 59 s.
 struct NewMap {
