@@ -15,6 +15,7 @@ constexpr double kFirstScaleSigma = 0.2;  ///< of that scale
 constexpr double kCorrected = 0.01;       ///< share of a variance that an INS loses by a fix at least
 constexpr double kStands = 0.5;           ///< share that is left of a velocity's variance once the car stands, at most
 constexpr double kDistrustTime = 5.0;     ///< s, in which distrust of the INS velocity fades
+constexpr double kYawTime = 1.0;          ///< s: over this time the yaws of two channels of one gyro are compared
 constexpr int kOutliers = 3;              ///< in a row: vision itself has moved away
 
 /// The INS has used a fix since its last sample: something of its pose became surer.
@@ -132,7 +133,9 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
 
   if (ins) follow_ins_errors(s.odometry, dt, false);
   Eigen::Matrix3d R = motion_noise(m, s, view, motion, dt);
+  const int drift = ins ? kInsDrift : kVoDrift;
   m.yaw_rate_variance = R(2, 2) / dt;
+  if (s.channel != FusionChannel::kWheel) m.yaw_rate_variance += kYawTime * now_.P(drift, drift);
   if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
     R.row(2).setZero();
     R.col(2).setZero();

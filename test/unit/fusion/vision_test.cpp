@@ -233,6 +233,41 @@ TEST_CASE("a vision alone learns no scale from itself, whatever its velocities s
   CHECK(std::abs(scale_learnt(1.0, 1.05, true) - std::log(1.05)) < 0.01);  // teeth: who can tell it teaches it
 }
 
+/// Yaw error at the end of a tunnel beside a vision of the same gyro, whose bias the INS has wrong by 0.003 rad/s and
+/// says `said` of it.
+double yaw_off(double said) {
+  Tunnel t;
+  t.with_wheels = false;
+  t.vo.drift_std = 0.0;
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events) {
+    e.sample.shares_imu = e.sample.channel == FusionChannel::kVo;
+    const double lost = seconds(t.drive, e.sample.odometry.t_us) - 40.0;
+    if (e.sample.channel != FusionChannel::kIns || lost < 0.0) continue;
+    Odometry& o = e.sample.odometry;
+    const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
+    o.T_frame_vehicle.q = quaternion({a.yaw + 0.003 * lost, a.pitch, a.roll});
+    o.angular_rate.z() += 0.003;
+    const double variance = said * said * lost * lost;
+    o.cov_pose(5, 5) += variance;
+  }
+  Fusion fusion({});
+  double off = 0.0;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    fusion.set_ins_gyro(Eigen::Vector3d::Constant(said), {});
+    if (seconds(t.drive, e.sample.odometry.t_us) > 99.0) return;
+    off = wrap_angle(f.estimate().x(kYaw) - planar_pose(t.drive.truth_at(e.sample.odometry.t_us)).z());
+  });
+  return std::abs(off);
+}
+
+TEST_CASE("of two that share a gyro the one that knows its bias speaks of the yaw") {
+  const double known = yaw_off(0.01), hidden = yaw_off(1e-6);
+  INFO(known << " rad, " << hidden << " where the INS says nothing of its bias");
+  CHECK(known < 0.05);
+  CHECK(hidden > 0.1);  // teeth
+}
+
 /// In the tunnel a vision drives off from 50 s, tells nothing from 52 s to 53 s, and goes on from there in a new map
 /// (`reset`) whose lengths are wrong by `scaled`; again nothing from 58 s to 59 s.
 struct NewMap {
