@@ -21,7 +21,7 @@ constexpr int kPatch_px = 11;
 constexpr float kLeastAlike = 0.7F;  // correlation of the best place; half a step off the true one costs 0.2
 constexpr float kLessAlike = 0.1F;   // by which the best of the other places must stay behind
 constexpr int kApart = 4;            // steps: other places
-constexpr size_t kPixels = kPatch_px * kPatch_px;
+constexpr size_t kPixels = size_t{kPatch_px} * kPatch_px;
 
 /// Where a point of the last picture is seen now, by its inverse depth: h = a + inverse * b, (M.44).
 struct Line {
@@ -46,9 +46,9 @@ struct Template {
   std::array<float, kPixels> value;
   bool flat = false;
   explicit Template(const std::vector<uint8_t>& grey) {
-    for (int row = 0, i = 0; row < kPatch_px; ++row)
-      for (int column = 0; column < kPatch_px; ++column, ++i)
-        value[static_cast<size_t>(i)] = grey[static_cast<size_t>((row + 1) * (kPatch_px + 2) + column + 1)];
+    for (size_t row = 0, i = 0; row < kPatch_px; ++row)
+      for (size_t column = 0; column < kPatch_px; ++column, ++i)
+        value[i] = grey[(row + 1) * (kPatch_px + 2) + column + 1];
     float sum = 0.0F, squares = 0.0F;
     for (const float x : value) sum += x;
     for (float& x : value) {
