@@ -92,8 +92,9 @@ CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& m
                    const Eigen::Matrix3d& R, bool with_yaw) {
   const int n = with_yaw ? 3 : 2;
   const Planar clone = e.x.segment<3>(slots.clone);
-  const Eigen::Matrix3d A = after_motion_by_start(clone, motion);
-  Planar next = after_motion(clone, motion);
+  const MovedPlanar moved = moved_by(clone, motion);
+  const Eigen::Matrix3d& A = moved.by_start;
+  Planar next = moved.pose;
   Eigen::Matrix<double, 3, kSize> rows = A * e.P.middleRows<3>(slots.clone);  // cov(next, x)
   if (slots.velocity) {
     next.head<2>() -= dt * e.x.segment<2>(*slots.velocity);
@@ -106,8 +107,7 @@ CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& m
   Eigen::Matrix3d P = rows.middleCols<3>(slots.clone) * A.transpose();
   if (slots.velocity) P.leftCols<2>() -= dt * rows.middleCols<2>(*slots.velocity);
   if (slots.drift) P.col(2) -= dt * rows.col(*slots.drift);
-  const Eigen::Matrix3d to_frame = motion_by_end(clone).transpose();
-  P += to_frame * R * to_frame.transpose();
+  P += moved.by_motion * R * moved.by_motion.transpose();
   CarriedOn told;
   told.difference = difference_of(next, e.x.segment<3>(kPos));
   const Eigen::Matrix3d with_predicted = rows.middleCols<3>(kPos);

@@ -70,10 +70,7 @@ Planar motion_between(const Planar& a, const Planar& b) {
   return {d.x(), d.y(), wrap_angle(b.z() - a.z())};
 }
 
-Planar after_motion(const Planar& a, const Planar& motion) {
-  const Eigen::Vector2d d = rotation(a.z()) * motion.head<2>();
-  return {a.x() + d.x(), a.y() + d.y(), wrap_angle(a.z() + motion.z())};
-}
+Planar after_motion(const Planar& a, const Planar& motion) { return moved_by(a, motion).pose; }
 
 Eigen::Matrix3d motion_by_start(const Planar& a, const Planar& b) {
   const Planar m = motion_between(a, b);
@@ -89,19 +86,25 @@ Eigen::Matrix3d motion_by_end(const Planar& a) {
   return J;
 }
 
-Eigen::Matrix3d after_motion_by_start(const Planar& a, const Planar& motion) {
-  const Eigen::Vector2d d = rotation(a.z()) * motion.head<2>();
-  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
-  J(0, 2) = -d.y();
-  J(1, 2) = d.x();
-  return J;
+Eigen::Matrix3d after_motion_by_start(const Planar& a, const Planar& motion) { return moved_by(a, motion).by_start; }
+
+MovedPlanar moved_by(const Planar& a, const Planar& motion) {
+  const Eigen::Matrix2d R = rotation(a.z());
+  const Eigen::Vector2d d = R * motion.head<2>();
+  MovedPlanar m{{a.x() + d.x(), a.y() + d.y(), wrap_angle(a.z() + motion.z())},
+                Eigen::Matrix3d::Identity(),
+                Eigen::Matrix3d::Identity()};
+  m.by_start(0, 2) = -d.y();
+  m.by_start(1, 2) = d.x();
+  m.by_motion.topLeftCorner<2, 2>() = R;
+  return m;
 }
 
 Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, const Planar& motion,
                                   const Eigen::Matrix3d& P_b, const Eigen::Vector3d& floor_sigma) {
-  const Eigen::Matrix3d carry = after_motion_by_start(a, motion);
-  const Eigen::Matrix3d grown = P_b - carry * P_a * carry.transpose();
-  const Eigen::Matrix3d to_start = motion_by_end(a);
+  const MovedPlanar moved = moved_by(a, motion);
+  const Eigen::Matrix3d grown = P_b - moved.by_start * P_a * moved.by_start.transpose();
+  const Eigen::Matrix3d to_start = moved.by_motion.transpose();
   const Eigen::Matrix3d in_start = to_start * grown * to_start.transpose();
   const Eigen::Matrix3d above = in_start - Eigen::Matrix3d(floor_sigma.cwiseAbs2().asDiagonal());
   if (Eigen::LLT<Eigen::Matrix3d>(above).info() == Eigen::Success) return 0.5 * (in_start + in_start.transpose());
@@ -117,10 +120,8 @@ PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& st
                            const Eigen::Matrix3d& P_end) {
   const Eigen::Matrix3d R =
       motion_covariance(start.pose, start.P, motion, P_end, Eigen::Vector3d::Constant(kLocalFloor));
-  const Eigen::Matrix3d carry = after_motion_by_start(other.pose, motion);
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  turn.topLeftCorner<2, 2>() = rotation(other.pose.z());
-  return {after_motion(other.pose, motion), carry * other.P * carry.transpose() + turn * R * turn.transpose()};
+  const MovedPlanar m = moved_by(other.pose, motion);
+  return {m.pose, m.by_start * other.P * m.by_start.transpose() + m.by_motion * R * m.by_motion.transpose()};
 }
 
 double height_growth(double way, double dt) {

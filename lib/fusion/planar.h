@@ -42,6 +42,13 @@ Eigen::Matrix3d motion_by_end(const Planar& a);
 /// d after_motion / d a.
 Eigen::Matrix3d after_motion_by_start(const Planar& a, const Planar& motion);
 
+/// after_motion and its Jacobians, the yaw's sine and cosine worked out once.
+struct MovedPlanar {
+  Planar pose;
+  Eigen::Matrix3d by_start, by_motion;
+};
+MovedPlanar moved_by(const Planar& a, const Planar& motion);
+
 /// Covariance of the motion between two poses of one estimator, in the axes of a, if its errors were a sum of
 /// independent steps: what the second covariance has more than the first carried along (F.12). Directions in which it
 /// shrank, because the estimator learnt something, get the floor.
