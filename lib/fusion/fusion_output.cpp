@@ -99,8 +99,8 @@ FusionReport Fusion::report() const {
 
 template <class Self, class Visitor>
 void Fusion::visit_members(Self& self, const Visitor& visit) {
-  visit(self.started_, self.placed_, self.t_us_, self.imm_.probability, self.now_.x, self.now_.P);
-  for (auto& mode : self.imm_.modes) visit(mode.estimate.x, mode.estimate.P, mode.log_likelihood);
+  visit(self.started_, self.placed_, self.t_us_, self.imm_.probability, self.now_);
+  for (auto& mode : self.imm_.modes) visit(mode.estimate, mode.log_likelihood);
   for (auto& r : self.reports_)
     visit(r.status, r.weight, r.alpha, r.nis, r.dof, r.innovation, r.innovation_variance, r.gate, r.last_us);
   for (auto& share : self.information_) visit(share);

@@ -21,7 +21,7 @@ void wrap_yaws(Vector& x) {
 template <int M>
 Eigen::Matrix<double, kSize, M> times_transposed(const Matrix& P, const Eigen::Matrix<double, M, kSize>& H) {
   Eigen::Matrix<double, kSize, M> PH = Eigen::Matrix<double, kSize, M>::Zero();
-  for (int j = 0; j < kSize; ++j)
+  for (int j = 0; j < kStates; ++j)
     for (int k = 0; k < M; ++k)
       if (H(k, j) != 0.0) PH.col(k) += H(k, j) * P.col(j);
   return PH;
@@ -32,7 +32,7 @@ Eigen::Matrix<double, M, M> innovation_covariance(const Eigen::Matrix<double, M,
                                                   const Eigen::Matrix<double, kSize, M>& PH,
                                                   const Eigen::Matrix<double, M, M>& R) {
   Eigen::Matrix<double, M, M> S = R;
-  for (int j = 0; j < kSize; ++j)
+  for (int j = 0; j < kStates; ++j)
     for (int k = 0; k < M; ++k)
       if (H(k, j) != 0.0) S.row(k) += H(k, j) * PH.row(j);
   return S;
@@ -61,8 +61,8 @@ void set_independent(FusionEstimate& e, int index, double value, double sigma) {
 
 void clone_pose(FusionEstimate& e, int clone) {
   e.x.segment<3>(clone) = e.x.segment<3>(kPos);
-  e.P.middleRows<3>(clone) = e.P.middleRows<3>(kPos).eval();
-  e.P.middleCols<3>(clone) = e.P.middleCols<3>(kPos).eval();
+  e.P.middleRows<3>(clone) = e.P.middleRows<3>(kPos);
+  e.P.middleCols<3>(clone) = e.P.middleCols<3>(kPos);
 }
 
 template <int M>
@@ -81,10 +81,9 @@ FusionInnovation<M> kalman_update(FusionEstimate& e, const Eigen::Matrix<double,
   }
   const Eigen::Matrix<double, M, 1> whitened = llt.matrixL().solve(innovation);
   Vector dx = Vector::Zero();
-  for (int k = 0; k < M; ++k) {
-    dx += whitened(k) * W.col(k);
-    for (int j = 0; j < kSize; ++j) e.P.col(j) -= W(j, k) * W.col(k);
-  }
+  for (int k = 0; k < M; ++k) dx += whitened(k) * W.col(k);
+  for (int j = 0; j < kStates; ++j)
+    for (int k = 0; k < M; ++k) e.P.col(j) -= W(j, k) * W.col(k);
   e.x = plus(e.x, dx);
   const double nis = whitened.squaredNorm();
   const double log_det = 2.0 * L.diagonal().array().log().sum();

@@ -21,13 +21,17 @@ enum Index {
   kWheelScale = 17,   ///< likewise
   kInsVelocity = 18,  ///< m/s, east and north: error of the INS velocity, which lasts through an outage
   kInsDrift = 20,     ///< rad/s, measured yaw rate of the INS less true: its gyro bias' error
-  kSize = 21
+  kStates = 21,       ///< the states end here
+  kSize = 24          ///< and zeros follow, so that columns are whole registers of four doubles
 };
 
 inline constexpr int kYaws[] = {kYaw, kInsClone + 2, kVoClone + 2, kWheelClone + 2};
 
 using Vector = Eigen::Matrix<double, kSize, 1>;
 using Matrix = Eigen::Matrix<double, kSize, kSize>;
+/// Without the zeros, for what is written down.
+using States = Eigen::Matrix<double, kStates, 1>;
+using StatesCovariance = Eigen::Matrix<double, kStates, kStates>;
 
 }  // namespace fusion
 

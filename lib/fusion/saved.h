@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "fusion/fusion_state.h"
 #include "samples/samples.h"
 #include "stream/state_bytes.h"
 
@@ -26,6 +27,15 @@ void read(StateReader& r, std::optional<T>& value) {
   const bool has = r.get<bool>();
   value = r.get<T>();
   if (!has) value.reset();
+}
+
+inline void write(StateWriter& w, const FusionEstimate& e) {
+  w.put(States(e.x.head<kStates>()));
+  w.put(StatesCovariance(e.P.topLeftCorner<kStates, kStates>()));
+}
+inline void read(StateReader& r, FusionEstimate& e) {
+  e.x.head<kStates>() = r.get<States>();
+  e.P.topLeftCorner<kStates, kStates>() = r.get<StatesCovariance>();
 }
 
 /// `Pose` is Odometry or const Odometry.

@@ -99,8 +99,8 @@ class ImmFusionStage final : public Stage {
   void digest(Digest& digest) const override {
     digest.add(fusion_.imm().probability);
     for (const Mode& mode : fusion_.imm().modes) {
-      digest.add(mode.estimate.x);
-      digest.add(mode.estimate.P);
+      digest.add(fusion::States(mode.estimate.x.head<fusion::kStates>()));
+      digest.add(fusion::StatesCovariance(mode.estimate.P.topLeftCorner<fusion::kStates, fusion::kStates>()));
     }
   }
 
