@@ -90,17 +90,17 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (!started_ && !good) return done(FuseStatus::kBadQuality);
   if (!started_) start(s);
 
-  const Before before{now_.x, now_.P.block<3, 3>(kPos, kPos), seconds_between(t_us_, s.odometry.t_us)};
+  const Before before{{planar_estimate(now_), now_.x(kSpeed)}, seconds_between(t_us_, s.odometry.t_us)};
   advance(s.odometry.t_us);
   if (!good) {
     now_ = combine(imm_);
-    follow_local(before, {now_.x, now_.P.block<3, 3>(kPos, kPos)});
+    follow_local(before, {planar_estimate(now_), now_.x(kSpeed)});
     memory(s.channel).last.reset();
     if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
     return done(FuseStatus::kBadQuality);
   }
   memory(s.channel).alive_us = report.last_us = t_us_;
-  const double known = combine_planar(imm_).P.topLeftCorner<2, 2>().trace();
+  const double known = combine_planar(imm_).planar.P.topLeftCorner<2, 2>().trace();
   const LevelView view = level_view(s.odometry);
   const FuseStatus status = fuse(s, view, before, report);
   if (s.channel == FusionChannel::kVo) update_tie(s);
@@ -129,7 +129,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
   const PlanarMixture after = combine_planar(imm_);
   follow_local(before, after);
   if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for the tie
-  return ins ? fuse_gain(s, view, {after.x.segment<3>(kPos), after.P}, report) : status;
+  return ins ? fuse_gain(s, view, after.planar, report) : status;
 }
 
 /// The first sample: position, yaw and speed as it says; a channel without enu gives a local frame only.

@@ -137,8 +137,7 @@ class Fusion {
 
   /// The combined estimate at the last sample, as far as the local pose needs it.
   struct Before {
-    fusion::Vector x;
-    Eigen::Matrix3d P;
+    PlanarMixture at;
     double dt = 0.0;  ///< s since then
   };
 

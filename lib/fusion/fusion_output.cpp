@@ -20,16 +20,16 @@ constexpr double kLostSigma = 100.0;  ///< m: nobody should drive by this
 /// of it the speed cannot explain is hindsight (a turn shows which way the drift went): the local pose leaves it out,
 /// the published one makes it up at its bounded rate.
 void Fusion::follow_local(const Before& before, const PlanarMixture& now) {
-  const Planar start = before.x.segment<3>(kPos);
-  Planar motion = motion_between(start, now.x.segment<3>(kPos));
-  const Planar driven(0.5 * (before.x(kSpeed) + now.x(kSpeed)) * before.dt, 0.0, motion.z());
+  const Planar& start = before.at.planar.pose;
+  Planar motion = motion_between(start, now.planar.pose);
+  const Planar driven(0.5 * (before.at.speed + now.speed) * before.dt, 0.0, motion.z());
   const Planar hindsight = motion - driven;
   if (hindsight.norm() > config_.jump_tolerance) {
-    const Eigen::Vector2d shift = Eigen::Rotation2Dd(before.x(kYaw)) * hindsight.head<2>();
+    const Eigen::Vector2d shift = Eigen::Rotation2Dd(start.z()) * hindsight.head<2>();
     take_fix(comeback_, config_.comeback, {shift.x(), shift.y(), 0.0}, false);
     motion = driven;
   }
-  local_ = moved_along(local_, {start, before.P}, motion, now.P);
+  local_ = moved_along(local_, before.at.planar, motion, now.planar.P);
 }
 
 /// Height by the channel that speaks for the motion: its own steps, with what its covariance grows by.

@@ -3,20 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/so3.h"
+
 namespace roadfix {
 
 using namespace fusion;
 
 namespace {
 
-/// Moments of the mixture of a and b = a + d, weight w on b. Differences are taken from the first component, so that
-/// equal components give their own bits. `P` may be that of a or b.
-void mixed_covariance(const Matrix& P_a, const Matrix& P_b, const Vector& d, double w, Matrix& P) {
-  const double spread = (1.0 - w) * w;
-  for (int j = 0; j < kSize; ++j) {
-    P.col(j) = (P_a.col(j) + w * (P_b.col(j) - P_a.col(j)) + (spread * d(j)) * d).eval();
-  }
-}
+/// Of the mixture of a and b = a + d, weight w on b, what the difference d adds to the covariance.
+double spread(double w) { return (1.0 - w) * w; }
 
 }  // namespace
 
@@ -38,11 +34,13 @@ void mix(Imm& imm, const Eigen::Matrix2d& transition) {
     return predicted(j) > 0.0 ? transition(1, j) * imm.probability(1) / predicted(j) : static_cast<double>(j);
   };
   const double w_a = from_b(0), w_b = from_b(1);
-  Matrix P;
-  mixed_covariance(a.P, b.P, d, w_a, P);
-  mixed_covariance(a.P, b.P, d, w_b, b.P);
+  // Differences are taken from the first mode, so that equal modes keep their bits.
+  for (int j = 0; j < kStates; ++j) {
+    const Vector first = a.P.col(j), apart = b.P.col(j) - first;
+    a.P.col(j) = first + w_a * apart + (spread(w_a) * d(j)) * d;
+    b.P.col(j) = first + w_b * apart + (spread(w_b) * d(j)) * d;
+  }
   b.x = plus(a.x, w_b * d);
-  a.P = P;
   a.x = plus(a.x, w_a * d);
   for (Mode& mode : imm.modes) mode.log_likelihood = 0.0;
   imm.probability = predicted;
@@ -66,9 +64,10 @@ FusionEstimate combine(const Imm& imm) {
   const FusionEstimate& a = imm.modes[0].estimate;
   const FusionEstimate& b = imm.modes[1].estimate;
   const Vector d = difference(b.x, a.x);
+  const double w = imm.probability(1);
   FusionEstimate m;
-  m.x = plus(a.x, imm.probability(1) * d);
-  mixed_covariance(a.P, b.P, d, imm.probability(1), m.P);
+  m.x = plus(a.x, w * d);
+  for (int j = 0; j < kStates; ++j) m.P.col(j) = a.P.col(j) + w * (b.P.col(j) - a.P.col(j)) + (spread(w) * d(j)) * d;
   return m;
 }
 
@@ -76,12 +75,13 @@ PlanarMixture combine_planar(const Imm& imm) {
   const FusionEstimate& a = imm.modes[0].estimate;
   const FusionEstimate& b = imm.modes[1].estimate;
   const double w = imm.probability(1);
-  const Vector d = difference(b.x, a.x);
-  PlanarMixture m;
-  m.x = plus(a.x, w * d);
+  const Planar d = difference_of(b.x.segment<3>(kPos), a.x.segment<3>(kPos));
   const Eigen::Matrix3d P_a = a.P.block<3, 3>(kPos, kPos), P_b = b.P.block<3, 3>(kPos, kPos);
-  const Eigen::Vector3d spread = d.segment<3>(kPos);
-  m.P = P_a + w * (P_b - P_a) + ((1.0 - w) * w) * (spread * spread.transpose());
+  PlanarMixture m;
+  m.planar.pose = a.x.segment<3>(kPos) + w * d;
+  m.planar.pose.z() = wrap_angle(m.planar.pose.z());
+  m.planar.P = P_a + w * (P_b - P_a) + spread(w) * (d * d.transpose());
+  m.speed = a.x(kSpeed) + w * (b.x(kSpeed) - a.x(kSpeed));
   return m;
 }
 

@@ -9,6 +9,7 @@
 #include <array>
 
 #include "fusion/motion_model.h"
+#include "fusion/planar.h"
 
 namespace roadfix {
 
@@ -42,10 +43,10 @@ void reweigh(Imm& imm);
 /// Moments of the mixture, paper C (7), (8).
 FusionEstimate combine(const Imm& imm);
 
-/// The same where position and yaw are all of the covariance that is asked for.
+/// The same where the pose and the speed are all that is asked for.
 struct PlanarMixture {
-  fusion::Vector x = fusion::Vector::Zero();
-  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();  ///< of east, north, yaw
+  PlanarEstimate planar;
+  double speed = 0.0;  ///< m/s
 };
 PlanarMixture combine_planar(const Imm& imm);
 
