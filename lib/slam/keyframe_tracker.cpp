@@ -19,6 +19,9 @@ constexpr double kStereoScaleStd = 0.01;
 
 constexpr double kUnknownSpeed = 30.0;  ///< m/s, standard deviation where there is a pose but no motion yet
 
+constexpr double kBraking = 4.0;       ///< m/s2, firm
+constexpr double kSeenSpeedStd = 0.2;  ///< m/s, of a speed from two pictures
+
 /// The motion `T` stretched in time by `factor`.
 SE3 stretched(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
 
@@ -232,13 +235,17 @@ void KeyframeTracker::settle(int64_t t_us, const SE3& T_map_camera, const Matrix
   o.validity = Validity::kValid;
   o.cov_velocity = kUnknownSpeed * kUnknownSpeed * Eigen::Matrix3d::Identity();
   if (motion_ && motion_->dt_s > 0.0) {
-    const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * T_camera_vehicle;
-    o.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
-    o.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
+    tell_motion();
     const Matrix6d cov_vehicle = vehicle_covariance(cov_motion, T_map_camera, T_camera_vehicle);
     const Eigen::Matrix3d R = o.T_frame_vehicle.R();
     o.cov_velocity = R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s);
   }
+}
+
+void KeyframeTracker::tell_motion() {
+  const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * rig_.T_vehicle_left.inverse();
+  out_.odometry.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
+  out_.odometry.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
 }
 
 void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
@@ -265,6 +272,11 @@ void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
     out_.odometry.T_frame_vehicle = T_predicted * rig_.T_vehicle_left.inverse();
     out_.odometry.cov_pose = Matrix6d::Identity() * (without_s * without_s);
     out_.odometry.validity = Validity::kCoasting;
+    // By the motion of before, from which a braking car departs.
+    const bool going = motion_ && motion_->dt_s > 0.0;
+    if (going) tell_motion();
+    const double sigma = going ? kSeenSpeedStd + kBraking * without_s : kUnknownSpeed;
+    out_.odometry.cov_velocity = sigma * sigma * Eigen::Matrix3d::Identity();
     return;
   }
   out_.state = TrackState::kLost;

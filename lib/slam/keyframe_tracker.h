@@ -206,6 +206,7 @@ class KeyframeTracker {
   [[nodiscard]] std::optional<Eigen::Vector2d> appears(const Eigen::Vector3d& p_camera) const;
   [[nodiscard]] std::vector<Feature> hints(const SE3& T_map_camera) const;
   [[nodiscard]] bool solve(const std::vector<Feature>& features, const SE3& T_predicted);
+  void tell_motion();
   void drop_wrong_tracks(const std::vector<Feature>& features);
   void learn_found_share();
   [[nodiscard]] std::vector<double> flows_beyond(const Eigen::Quaterniond& q_now_keyframe,

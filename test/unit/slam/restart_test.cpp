@@ -158,6 +158,21 @@ TEST_CASE("nobody knows how fast stereo's first pose goes, and it says so") {
   CHECK(std::sqrt(second.cov_velocity(2, 2)) < 1.0);
 }
 
+TEST_CASE("what coasts goes on as fast as it went, and doubts it more and more") {
+  Drive drive;
+  for (int i = 0; i < kDark; ++i) (void)drive.frame(i);
+  const Odometry seen = (*drive).last().odometry;
+  double sigma_before = 0.0;
+  for (int i = kDark; i < kDark + 3; ++i) {
+    const Odometry& o = drive.frame(i).odometry;
+    CHECK(o.validity == Validity::kCoasting);
+    CHECK(o.velocity.z() == Approx(seen.velocity.z()));
+    CHECK(o.T_frame_vehicle.p.z() == Approx(kStep * i).margin(0.1));
+    CHECK(std::sqrt(o.cov_velocity(2, 2)) > sigma_before + 0.1);
+    sigma_before = std::sqrt(o.cov_velocity(2, 2));
+  }
+}
+
 TEST_CASE("the picture that a map is lost in is the first of the next one") {
   Drive drive;
   for (int i = 0; i < kDark; ++i) (void)drive.frame(i);
