@@ -6,8 +6,15 @@
 
 namespace roadfix {
 
-std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,
+VoMode mode_for(const Calibration& calibration) {
+  const SensorsCalibration& s = calibration.sensors;
+  return s.imu && !s.wheels && !s.camera_right ? VoMode::kMsckf : VoMode::kKeyframe;
+}
+
+std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& given,
                                        const std::vector<uint8_t>& superpoint_weights) {
+  VoTrackerConfig config = given;
+  if (config.mode == VoMode::kAuto) config.mode = mode_for(calibration);
   if (config.mode == VoMode::kMsckf) return std::make_unique<MsckfStage>(calibration, config, superpoint_weights);
   return std::make_unique<KeyframeStage>(calibration, config, superpoint_weights);
 }

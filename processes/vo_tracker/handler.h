@@ -14,7 +14,8 @@
 
 namespace roadfix {
 
-enum class VoMode { kKeyframe, kMsckf };
+/// kAuto: what suits the sensors, mode_for().
+enum class VoMode { kAuto, kKeyframe, kMsckf };
 
 /// Of mode `msckf`.
 struct MsckfVoConfig {
@@ -34,7 +35,7 @@ void visit(MsckfVoConfig& c, Visitor& v) {
 
 /// configs/<vehicle>/vo_tracker.yaml.
 struct VoTrackerConfig {
-  VoMode mode = VoMode::kKeyframe;
+  VoMode mode = VoMode::kAuto;
   int threads = 2;               ///< 2: bundle adjustment runs beside the tracking; the results are the same
   bool filter_stamps = false;    ///< the left camera's stamps are put on a line at the device's rate
   double stereo_gap = 0.005;     ///< s, largest difference of the stamps of a stereo pair
@@ -45,7 +46,7 @@ struct VoTrackerConfig {
 
 template <class Visitor>
 void visit(VoTrackerConfig& c, Visitor& v) {
-  v.choice("mode", c.mode, {{"keyframe", VoMode::kKeyframe}, {"msckf", VoMode::kMsckf}});
+  v.choice("mode", c.mode, {{"auto", VoMode::kAuto}, {"keyframe", VoMode::kKeyframe}, {"msckf", VoMode::kMsckf}});
   v.integer("threads", c.threads, 1, 2);
   v.boolean("filter_stamps", c.filter_stamps);
   v.number("stereo_gap_s", c.stereo_gap, 0.0, 0.1);
@@ -53,6 +54,11 @@ void visit(VoTrackerConfig& c, Visitor& v) {
   v.group("keyframe", c.keyframe);
   v.group("msckf", c.msckf);
 }
+
+/// The mode of a configuration that leaves it open. One camera beside an IMU without wheels: msckf, whose lengths are
+/// the IMU's own; the keyframe tracker would have them from the INS, which knows its speed no better than the pose that
+/// vision is to hold. Otherwise keyframe.
+VoMode mode_for(const Calibration& calibration);
 
 /// `superpoint_weights`: the bytes of superpoint_model. Throws where the calibration has no camera or not all of one.
 std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,

@@ -155,6 +155,27 @@ TEST_CASE("a window without a middle is refused with its file, line and value") 
   }
 }
 
+TEST_CASE("a mode that is left open follows the sensors: lengths from the IMU where there are no others") {
+  Calibration c = calibration(false);
+  const auto clock_of = [&](const VoTrackerConfig& config) {
+    const auto stage = make_vo_tracker(c, config);
+    const StageSpec& spec = stage->spec();
+    return spec.inputs.at(static_cast<std::size_t>(spec.clocks.at(0).input)).channel;
+  };
+  VoTrackerConfig keyframe;
+  keyframe.mode = VoMode::kKeyframe;
+  CHECK(clock_of({}) == "CAMERA_LEFT");
+  c.sensors.imu.emplace();
+  CHECK(clock_of({}) == "IMU");
+  CHECK(clock_of(keyframe) == "CAMERA_LEFT");
+  CHECK(make_vo_tracker(c, {})->effective_config().find("mode: msckf") != std::string::npos);
+  c.sensors.wheels.emplace();
+  CHECK(clock_of({}) == "CAMERA_LEFT");
+  c.sensors.wheels.reset();
+  c.sensors.camera_right = calibration(true).sensors.camera_right;
+  CHECK(clock_of({}) == "CAMERA_RIGHT");
+}
+
 TEST_CASE("what the calibration lacks is named at the start") {
   Calibration c = calibration(true);
   c.sensors.camera_right->mounting.reset();
