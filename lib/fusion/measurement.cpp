@@ -95,36 +95,39 @@ CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& m
   const MovedPlanar moved = moved_by(clone, motion);
   const Eigen::Matrix3d& A = moved.by_start;
   Planar next = moved.pose;
-  Eigen::Matrix<double, 3, kSize> rows = A * e.P.middleRows<3>(slots.clone);  // cov(next, x)
+  // cov(x, next), by columns: rows of three do not fill a register.
+  const Eigen::Matrix<double, kSize, 3> with_clone = e.P.middleRows<3>(slots.clone).transpose();
+  Eigen::Matrix<double, kSize, 3> with = with_clone.lazyProduct(A.transpose());
   if (slots.velocity) {
     next.head<2>() -= dt * e.x.segment<2>(*slots.velocity);
-    rows.topRows<2>() -= dt * e.P.middleRows<2>(*slots.velocity);
+    with.leftCols<2>() -= dt * e.P.middleRows<2>(*slots.velocity).transpose();
   }
   if (slots.drift) {
     next.z() = wrap_angle(next.z() - dt * e.x(*slots.drift));
-    rows.row(2) -= dt * e.P.row(*slots.drift);
+    with.col(2) -= dt * e.P.row(*slots.drift).transpose();
   }
-  Eigen::Matrix3d P = rows.middleCols<3>(slots.clone) * A.transpose();
-  if (slots.velocity) P.leftCols<2>() -= dt * rows.middleCols<2>(*slots.velocity);
-  if (slots.drift) P.col(2) -= dt * rows.col(*slots.drift);
+  Eigen::Matrix3d P = with.middleRows<3>(slots.clone).transpose();
+  P *= A.transpose();
+  if (slots.velocity) P.leftCols<2>() -= dt * with.middleRows<2>(*slots.velocity).transpose();
+  if (slots.drift) P.col(2) -= dt * with.row(*slots.drift).transpose();
   P += moved.by_motion * R * moved.by_motion.transpose();
   CarriedOn told;
   told.difference = difference_of(next, e.x.segment<3>(kPos));
-  const Eigen::Matrix3d with_predicted = rows.middleCols<3>(kPos);
+  const Eigen::Matrix3d with_predicted = with.middleRows<3>(kPos).transpose();
   Eigen::Matrix3d S = e.P.block<3, 3>(kPos, kPos) + P - with_predicted - with_predicted.transpose();
   S = 0.5 * (S + S.transpose()).eval();
   told.innovation = likelihood(told.difference, S);
   for (int i = 0; i < n; ++i) {
     e.x(kPos + i) = next(i);
-    e.P.row(kPos + i) = rows.row(i);
-    e.P.col(kPos + i) = rows.row(i).transpose();
+    e.P.row(kPos + i) = with.col(i).transpose();
+    e.P.col(kPos + i) = with.col(i);
   }
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) e.P(kPos + i, kPos + j) = 0.5 * (P(i, j) + P(j, i));
   if (!with_yaw) {  // the yaw that stays is correlated with the clone's
-    const Eigen::Vector2d with = rows.topRows<2>().col(kYaw);
-    e.P.block<2, 1>(kPos, kYaw) = with;
-    e.P.block<1, 2>(kYaw, kPos) = with.transpose();
+    const Eigen::RowVector2d with_yaw_kept = with.block<1, 2>(kYaw, 0);
+    e.P.block<1, 2>(kYaw, kPos) = with_yaw_kept;
+    e.P.block<2, 1>(kPos, kYaw) = with_yaw_kept.transpose();
   }
   return told;
 }
