@@ -157,7 +157,7 @@ void Fusion::start(const ChannelSample& s) {
   set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
   for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::sqrt(s.odometry.cov_velocity(0, 0)));
   set_independent(e, kInsDrift, 0.0, ins_drift_std_);
-  for (const int clone : {int{kInsClone}, int{kVoClone}, int{kWheelClone}}) clone_pose(e, clone);
+  for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
   for (Mode& mode : imm_.modes) mode.estimate = e;
   now_ = e;
   started_ = true;
@@ -171,7 +171,7 @@ void Fusion::place(const Odometry& o) {
     FusionEstimate& e = mode.estimate;
     for (int i = 0; i < 3; ++i) set_independent(e, kPos + i, planar_pose(o)(i), 1.0);
     e.P.block<3, 3>(kPos, kPos) = planar_covariance(o);
-    for (const int clone : {int{kInsClone}, int{kVoClone}, int{kWheelClone}}) clone_pose(e, clone);
+    for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
   }
   for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) memory(c).last.reset();
   height_ = o.T_frame_vehicle.p.z();

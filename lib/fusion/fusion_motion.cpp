@@ -121,7 +121,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
   }
   const bool ins = s.channel == FusionChannel::kIns;
   const double dt = m.last ? seconds_between(m.last->t_us, t_us_) : 0.0;
-  if (dt > timeout(s.channel)) m.last.reset();
+  if (ins ? dt >= timeout(s.channel) : dt > timeout(s.channel)) m.last.reset();  // the wheels may have the INS's clone
   if (ins && !m.last) {
     ins_corrected_ = false;
     follow_ins_errors(s.odometry, 0.0, true);

@@ -7,25 +7,25 @@ namespace roadfix {
 namespace fusion {
 
 enum Index {
-  kPos = 0,       ///< m, east and north
-  kYaw = 2,       ///< rad, counterclockwise from east
-  kSpeed = 3,     ///< m/s, along the vehicle's x
-  kAccel = 4,     ///< m/s2
-  kTurn = 5,      ///< rad/s, yaw rate
-  kBase = 6,      ///< the motion models' own states end here
-  kInsClone = 6,  ///< east, north, yaw at the last use of each channel (stochastic cloning)
+  kPos = 0,                 ///< m, east and north
+  kYaw = 2,                 ///< rad, counterclockwise from east
+  kSpeed = 3,               ///< m/s, along the vehicle's x
+  kAccel = 4,               ///< m/s2
+  kTurn = 5,                ///< rad/s, yaw rate
+  kBase = 6,                ///< the motion models' own states end here
+  kInsClone = 6,            ///< east, north, yaw at the last use of each channel (stochastic cloning)
+  kWheelClone = kInsClone,  ///< the wheels are used while the INS is silent alone: one place serves both
   kVoClone = 9,
-  kWheelClone = 12,
-  kVoScale = 15,      ///< log of measured over true length
-  kVoDrift = 16,      ///< rad/s, measured yaw rate less true
-  kWheelScale = 17,   ///< likewise
-  kInsVelocity = 18,  ///< m/s, east and north: error of the INS velocity, which lasts through an outage
-  kInsDrift = 20,     ///< rad/s, measured yaw rate of the INS less true: its gyro bias' error
-  kStates = 21,       ///< the states end here
-  kSize = 24          ///< and zeros follow, so that columns are whole registers of four doubles
+  kVoScale = 12,      ///< log of measured over true length
+  kVoDrift = 13,      ///< rad/s, measured yaw rate less true
+  kWheelScale = 14,   ///< likewise
+  kInsVelocity = 15,  ///< m/s, east and north: error of the INS velocity, which lasts through an outage
+  kInsDrift = 17,     ///< rad/s, measured yaw rate of the INS less true: its gyro bias' error
+  kStates = 18,       ///< the states end here
+  kSize = 20          ///< and zeros follow, so that columns are whole registers of four doubles
 };
 
-inline constexpr int kYaws[] = {kYaw, kInsClone + 2, kVoClone + 2, kWheelClone + 2};
+inline constexpr int kYaws[] = {kYaw, kInsClone + 2, kVoClone + 2};
 
 using Vector = Eigen::Matrix<double, kSize, 1>;
 using Matrix = Eigen::Matrix<double, kSize, kSize>;

@@ -140,11 +140,11 @@ void Fusion::distrust_velocity(const Planar& difference) {
 }
 
 /// The absolute pose contradicts for so long that the fusion must be wrong: its uncertainty grows to the contradiction,
-/// and with it that of the odometries' poses beside it, which would be as wrong. Where vision still says otherwise, the
+/// and with it that of the vision's pose beside it, which would be as wrong. Where vision still says otherwise, the
 /// published pose may be as wrong as that for a while.
 void Fusion::give_way(const Planar& difference) {
   const Eigen::Matrix3d all = difference * difference.transpose();
-  constexpr int kTogether[] = {kPos, kVoClone, kWheelClone};
+  constexpr int kTogether[] = {kPos, kVoClone};
   for (Mode& mode : imm_.modes)
     for (const int i : kTogether)
       for (const int j : kTogether) mode.estimate.P.block<3, 3>(i, j) += all;
@@ -193,6 +193,7 @@ void Fusion::remember(const ChannelSample& s, const LevelView& view) {
   if (s.channel == FusionChannel::kIns || !alive(FusionChannel::kIns)) attitude_ = s.odometry;
   m.last = s.odometry;
   m.view = view;
+  if (s.channel == FusionChannel::kIns) memory(FusionChannel::kWheel).last.reset();  // it has their clone
   if (m.carried) return;
   const int clone = slots(s.channel).clone;
   for (Mode& mode : imm_.modes) {
