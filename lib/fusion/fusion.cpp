@@ -93,7 +93,7 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   const Before before{{planar_estimate(now_), now_.x(kSpeed)}, seconds_between(t_us_, s.odometry.t_us)};
   advance(s.odometry.t_us);
   if (!good) {
-    now_ = combine(imm_);
+    combine(imm_, now_);
     follow_local(before, {planar_estimate(now_), now_.x(kSpeed)});
     memory(s.channel).last.reset();
     if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
@@ -106,7 +106,7 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (s.channel == FusionChannel::kVo) update_tie(s);
   remember(s, view);
   reweigh(imm_);
-  now_ = combine(imm_);
+  combine(imm_, now_);
   report.status = status;
   weigh(s.channel, std::max(0.0, known / now_.P.block<2, 2>(kPos, kPos).trace() - 1.0));
   return status;
@@ -122,13 +122,13 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
     place(s.odometry);
     return FuseStatus::kAccepted;
   }
-  if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for its gate
+  if (s.channel == FusionChannel::kVo) combine(imm_, now_);  // for its gate
   move_height(s);
   const FuseStatus status = fuse_motion(s, view, report);
   fuse_rates(s, view, !ins && status == FuseStatus::kAccepted);
   const PlanarMixture after = combine_planar(imm_);
   follow_local(before, after);
-  if (s.channel == FusionChannel::kVo) now_ = combine(imm_);  // for the tie
+  if (s.channel == FusionChannel::kVo) combine(imm_, now_);  // for the tie
   return ins ? fuse_gain(s, view, after.planar, report) : status;
 }
 
@@ -176,7 +176,7 @@ void Fusion::place(const Odometry& o) {
   for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) memory(c).last.reset();
   height_ = o.T_frame_vehicle.p.z();
   height_variance_ = o.cov_pose(2, 2);
-  now_ = combine(imm_);
+  combine(imm_, now_);
   tie_.forget();
   placed_ = true;
   foreign_ = false;

@@ -172,8 +172,8 @@ class Fusion {
   [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
   void follow_ins_errors(const Odometry& ins, double dt, bool was_away);
-  /// m2/s2, east and north, by which the INS says that its velocity is unsurer than what lasts of its error.
-  [[nodiscard]] Eigen::Vector2d grown_velocity_variance(const Odometry& ins) const;
+  /// m2/s2, east and north, by which the INS's velocity, with covariance P, is unsurer than what lasts of its error.
+  [[nodiscard]] Eigen::Vector2d grown_velocity_variance(const Eigen::Matrix2d& P) const;
   [[nodiscard]] Eigen::Matrix3d motion_noise(const Memory& m, const ChannelSample& sample, const LevelView& view,
                                              const Planar& motion, double dt) const;
   FuseStatus carry_by_ins(const Planar& motion, double dt, const Eigen::Matrix3d& R, bool with_yaw,

@@ -114,7 +114,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   f.speed_variance = P(3, 3) + wander * wander;
   if (!s.velocity || silent > 0.0) f.speed_variance += config_.speed_sigma * config_.speed_sigma;
   if (told && s.velocity) {  // after a gap, say: the state hears of it only when the horizon is there
-    const Eigen::Vector2d grown = grown_velocity_variance(*a.felt);
+    const Eigen::Vector2d grown = grown_velocity_variance(horizontal_velocity_covariance(*a.felt));
     f.planar.P.diagonal().head<2>() += heard * heard * grown;
     if (silent <= 0.0) f.speed_variance += F.block<1, 2>(3, *s.velocity).cwiseAbs2().dot(grown.transpose());
   }

@@ -50,9 +50,7 @@ bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const
          memory(other).yaw_rate_variance < variance;
 }
 
-Eigen::Vector2d Fusion::grown_velocity_variance(const Odometry& ins) const {
-  const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
-  const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
+Eigen::Vector2d Fusion::grown_velocity_variance(const Eigen::Matrix2d& P) const {
   return (P - memory(FusionChannel::kIns).velocity_covariance).diagonal().cwiseMax(0.0);
 }
 
@@ -60,11 +58,10 @@ Eigen::Vector2d Fusion::grown_velocity_variance(const Odometry& ins) const {
 /// says; where a fix did, the INS came to stand or was away, what was known of them is void.
 void Fusion::follow_ins_errors(const Odometry& ins, double dt, bool was_away) {
   Memory& m = memory(FusionChannel::kIns);
-  const Eigen::Matrix3d R = ins.T_frame_vehicle.R();
-  const Eigen::Matrix2d P = (R * ins.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
+  const Eigen::Matrix2d P = horizontal_velocity_covariance(ins);
   const double drift_variance = ins_drift_std_ * ins_drift_std_;
   const bool redone = was_away || ins_corrected_ || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
-  const Eigen::Vector2d grown = grown_velocity_variance(ins);
+  const Eigen::Vector2d grown = grown_velocity_variance(P);
   const double drift_grown = std::max(0.0, drift_variance - m.drift_variance);
   distrust_ *= std::exp(-dt / kDistrustTime);
   for (Mode& mode : imm_.modes) {

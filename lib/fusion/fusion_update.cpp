@@ -56,7 +56,7 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
   std::optional<FusionMeasurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
-  now_ = combine(imm_);
+  combine(imm_, now_);
   const FusionMeasurement<3> plain = absolute_pose(now_.x, view.pose, view.P);
   tell(judge<3>(now_, plain.H, plain.innovation, plain.R), plain.innovation, report);
   FuseStatus status = FuseStatus::kAccepted;
@@ -113,7 +113,7 @@ void Fusion::apply_gain(const FusionMeasurement<3>& gain) {
     m.innovation += gain.H * difference(before.x, x);
     return m;
   });
-  now_ = combine(imm_);
+  combine(imm_, now_);
   // Taken over in every direction: nothing is left that the INS does not know.
   foreign_ = gain.R.diagonal().maxCoeff() >= kUninformative;
   count_fix(difference(now_.x, before.x).segment<3>(kPos));
@@ -148,12 +148,12 @@ void Fusion::give_way(const Planar& difference) {
   for (Mode& mode : imm_.modes)
     for (const int i : kTogether)
       for (const int j : kTogether) mode.estimate.P.block<3, 3>(i, j) += all;
-  now_ = combine(imm_);
+  combine(imm_, now_);
   if (vision_speaks()) doubt_ = difference;
 }
 
 FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& report) {
-  now_ = combine(imm_);
+  combine(imm_, now_);
   Memory& m = memory(s.channel);
   const AdaptiveConfig& c = config_.adaptive;
   Odometry o = s.odometry;
@@ -183,7 +183,7 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& rep
     update<1>([&](const Vector& x) {
       return absolute_component(x, kSpeed, o.velocity.x(), std::sqrt(o.cov_velocity(0, 0)) + 1e-3);
     });
-  now_ = combine(imm_);
+  combine(imm_, now_);
   return FuseStatus::kAccepted;
 }
 

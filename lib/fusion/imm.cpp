@@ -60,15 +60,13 @@ void reweigh(Imm& imm) {
   if (sum > 0.0) imm.probability = weighted / sum;
 }
 
-FusionEstimate combine(const Imm& imm) {
+void combine(const Imm& imm, FusionEstimate& m) {
   const FusionEstimate& a = imm.modes[0].estimate;
   const FusionEstimate& b = imm.modes[1].estimate;
   const Vector d = difference(b.x, a.x);
   const double w = imm.probability(1);
-  FusionEstimate m;
   m.x = plus(a.x, w * d);
   for (int j = 0; j < kStates; ++j) m.P.col(j) = a.P.col(j) + w * (b.P.col(j) - a.P.col(j)) + (spread(w) * d(j)) * d;
-  return m;
 }
 
 PlanarMixture combine_planar(const Imm& imm) {

@@ -41,7 +41,12 @@ void predict(Imm& imm, const MotionNoise& noise, double dt);
 void reweigh(Imm& imm);
 
 /// Moments of the mixture, paper C (7), (8).
-FusionEstimate combine(const Imm& imm);
+void combine(const Imm& imm, FusionEstimate& combined);
+inline FusionEstimate combine(const Imm& imm) {
+  FusionEstimate combined;
+  combine(imm, combined);
+  return combined;
+}
 
 /// The same where the pose and the speed are all that is asked for.
 struct PlanarMixture {

@@ -37,6 +37,11 @@ Eigen::Matrix3d planar_covariance(const Matrix6d& C, double by_y, double by_z) {
 
 Eigen::Matrix3d planar_covariance(const Odometry& o) { return level_view(o).P; }
 
+Eigen::Matrix2d horizontal_velocity_covariance(const Odometry& o) {
+  const Eigen::Matrix3d R = o.T_frame_vehicle.R();
+  return (R * o.cov_velocity * R.transpose()).topLeftCorner<2, 2>();
+}
+
 LevelView level_view(const Odometry& o) {
   const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
   const double sr = std::sin(a.roll), cr = std::cos(a.roll), sp = std::sin(a.pitch), cp = std::cos(a.pitch);

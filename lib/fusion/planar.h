@@ -14,6 +14,9 @@ Planar planar_pose(const Odometry& odometry);
 /// Its covariance from the 6x6 pose covariance: yaw's error is that of the rotation about the level frame's z.
 Eigen::Matrix3d planar_covariance(const Odometry& odometry);
 
+/// Of the velocity, in the axes of the level frame.
+Eigen::Matrix2d horizontal_velocity_covariance(const Odometry& odometry);
+
 /// All of a pose that the plane needs, worked out once.
 struct LevelView {
   int64_t t_us = 0;
