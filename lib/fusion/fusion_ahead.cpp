@@ -127,14 +127,15 @@ Fusion::Poses Fusion::carried(const Ahead& a) const {
   const ReturnState& back = a.back ? *a.back : comeback_;
   const Odometry& attitude = a.felt != nullptr ? *a.felt : attitude_;
   const double grown = a.dt > 0.0 ? height_growth(a.way.head<2>().norm(), a.dt) : 0.0;
+  const double height_variance = follows(a) ? a.felt->cov_pose(2, 2) : height_variance_ + grown;
   const int64_t t_us = t_us_ + static_cast<int64_t>(std::llround(a.dt * 1e6));
 
   Planar pose = f.planar.pose + back.residual;
   pose.z() = wrap_angle(pose.z());
   const Eigen::Matrix3d P = f.planar.P + back.residual * back.residual.transpose() + doubt_ * doubt_.transpose();
   Poses out;
-  out.fused = full_pose(t_us, pose, P, height_ + a.rise + back.height,
-                        height_variance_ + grown + back.height * back.height, attitude);
+  out.fused =
+      full_pose(t_us, pose, P, height_ + a.rise + back.height, height_variance + back.height * back.height, attitude);
   out.fused.velocity.x() = f.speed;
   out.fused.cov_velocity.row(0).setZero();
   out.fused.cov_velocity.col(0).setZero();

@@ -48,8 +48,9 @@ void Fusion::move_height(const ChannelSample& s) {
   local_height_variance_ += grown;
 }
 
+/// Where it gained; while the place is the INS's, always: its height, too, is known as the INS knows it.
 void Fusion::gain_height(const Odometry& o) {
-  if (o.cov_pose(2, 2) >= (1.0 - config_.least_gain) * height_variance_) return;
+  if (foreign_ && o.cov_pose(2, 2) >= (1.0 - config_.least_gain) * height_variance_) return;
   take_height(comeback_, config_.comeback, o.T_frame_vehicle.p.z() - height_);
   height_ = o.T_frame_vehicle.p.z();
   height_variance_ = o.cov_pose(2, 2);

@@ -46,6 +46,23 @@ TEST_CASE("alone, the INS is what the fusion gives") {
   CHECK(seeing.second > 0.1);
 }
 
+TEST_CASE("alone, the INS's height is what the fusion gives, however little the INS says that it loses") {
+  const auto off = [](bool with_vision) {
+    Tunnel t;
+    t.ins.velocity_walk = 1e-4;
+    t.with_wheels = false;
+    Fusion fusion({});
+    double largest = 0.0;  // share of the variance that the fusion has too much, in the outage
+    run(fusion, with_vision ? t.events() : ins_stream(t.drive, t.ins, 1), [&](const Fusion& f, const StreamEvent& e) {
+      if (e.sample.channel != FusionChannel::kIns || e.gnss) return;
+      largest = std::max(largest, f.fused().cov_pose(2, 2) / e.sample.odometry.cov_pose(2, 2) - 1.0);
+    });
+    return largest;
+  };
+  CHECK(off(false) < 1e-9);
+  CHECK(off(true) > 1e-4);  // teeth: there only what it gained is taken
+}
+
 TEST_CASE("a gyro whose bias is known holds against a vision that turns away for some seconds") {
   // The INS says of its yaw what its gyro's bias adds up to. Taken for independent steps, that is worth less than the
   // vision's yaw in each step; known to last, it is worth more.
