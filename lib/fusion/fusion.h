@@ -112,8 +112,10 @@ class Fusion {
   [[nodiscard]] const FusionEstimate& estimate() const { return now_; }
   [[nodiscard]] const FrameTie& tie() const { return tie_; }
   [[nodiscard]] bool tie_frozen() const { return !gnss_; }
-  /// Once per request: vision disagrees and should start again at this pose.
-  [[nodiscard]] std::optional<VisionRestart> take_restart();
+  /// Vision disagrees, or is lost, and should start again; until take_restart().
+  [[nodiscard]] bool asks_restart() const { return !restart_reason_.empty(); }
+  /// `here`: fused, of the time that the request is stamped with (Outlook::poses).
+  [[nodiscard]] VisionRestart take_restart(const Odometry& here);
   [[nodiscard]] const FusionConfig& config() const { return config_; }
 
   void save(StateWriter& writer) const;
@@ -229,7 +231,7 @@ class Fusion {
   DropoutRamp ramp_;
   FrameTie tie_;
   AgreementState agreement_;
-  std::optional<VisionRestart> restart_;
+  std::string restart_reason_;  ///< of a request that nobody took yet; else empty
   std::optional<int64_t> restart_us_;
   std::optional<int64_t> refused_since_us_;
   std::optional<int64_t> last_fix_us_;

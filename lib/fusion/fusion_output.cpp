@@ -124,11 +124,7 @@ void Fusion::save(StateWriter& writer) const {
         m.alive_us, m.check.ratio, m.last.has_value());
     if (m.last) visit_odometry(*m.last, put);
   }
-  put(restart_.has_value());
-  if (restart_) {
-    put(restart_->T_vo_vehicle.q.coeffs(), restart_->T_vo_vehicle.p, restart_->velocity, restart_->cov_pose,
-        restart_->reason);
-  }
+  put(restart_reason_);
 }
 
 void Fusion::load(StateReader& reader) {
@@ -143,11 +139,7 @@ void Fusion::load(StateReader& reader) {
     visit_odometry(m.last.emplace(), get);
     m.view = level_view(*m.last);
   }
-  restart_.reset();
-  if (reader.get<bool>()) {
-    VisionRestart& r = restart_.emplace();
-    get(r.T_vo_vehicle.q.coeffs(), r.T_vo_vehicle.p, r.velocity, r.cov_pose, r.reason);
-  }
+  get(restart_reason_);
 }
 
 }  // namespace roadfix

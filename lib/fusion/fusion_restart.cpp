@@ -41,7 +41,11 @@ void Fusion::ask_restart(const char* reason) {
   const bool others = alive(FusionChannel::kIns) || alive(FusionChannel::kWheel);
   const bool lately = restart_us_ && seconds_between(*restart_us_, t_us_) < config_.restart_every;
   if (!tie_.valid() || !others || lately) return;
-  const Odometry here = fused();
+  restart_reason_ = reason;
+  restart_us_ = t_us_;
+}
+
+VisionRestart Fusion::take_restart(const Odometry& here) {
   VisionRestart r;
   r.T_vo_vehicle = tie_.to_vo(here.T_frame_vehicle);
   r.velocity = here.velocity;
@@ -49,15 +53,8 @@ void Fusion::ask_restart(const char* reason) {
   r.cov_pose = here.cov_pose;
   r.cov_pose.topRows<3>() = (R_vo_enu * r.cov_pose.topRows<3>()).eval();
   r.cov_pose.leftCols<3>() = (r.cov_pose.leftCols<3>() * R_vo_enu.transpose()).eval();
-  r.reason = reason;
-  restart_ = r;
-  restart_us_ = t_us_;
-}
-
-std::optional<VisionRestart> Fusion::take_restart() {
-  std::optional<VisionRestart> taken;
-  taken.swap(restart_);
-  return taken;
+  r.reason.swap(restart_reason_);
+  return r;
 }
 
 }  // namespace roadfix

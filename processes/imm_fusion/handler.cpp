@@ -85,8 +85,8 @@ class ImmFusionStage final : public Stage {
   void publish(int64_t now_utime, Outputs& outputs) override {
     for (aiding_t& record : aidings_) outputs.publish(kAiding, record);
     aidings_.clear();
-    if (const std::optional<VisionRestart> restart = fusion_.take_restart()) {
-      vo_restart_t message = vo_restart(*restart);
+    if (fusion_.asks_restart()) {
+      vo_restart_t message = vo_restart(fusion_.take_restart(outlook_.poses(fusion_).fused));
       outputs.publish(kRestart, message);
     }
     if (pose_slot_.due(now_utime)) publish_poses(outputs);

@@ -90,7 +90,10 @@ Outcome run_fault(const Trouble& fault, std::uint64_t seed) {
   Outcome o;
   run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
     const double t = seconds(e.sample.odometry.t_us);
-    if (fusion.take_restart()) ++o.restarts;
+    if (fusion.asks_restart()) {
+      (void)fusion.take_restart(fusion.fused());
+      ++o.restarts;
+    }
     if (t < fault.from_s) return;
     const test::PlanarError p = test::planar_error(drive, f.fused());
     if (t <= fault.to_s) o.largest = std::max(o.largest, p.distance());

@@ -111,7 +111,9 @@ Failure failing_vision(const std::function<bool(double, Planar&)>& fault) {
   Failure f;
   run(fusion, t.events(), [&](const Fusion& fused, const StreamEvent& e) {
     watch(fused, e);
-    if (const auto restart = fusion.take_restart(); restart && !f.restart) {
+    if (!fusion.asks_restart()) return;
+    const VisionRestart restart = fusion.take_restart(fusion.fused());
+    if (!f.restart) {
       f.restart = restart;
       f.truth_at_restart = fused.tie().to_vo(t.drive.truth_at(fused.t_us()).T_frame_vehicle);
     }

@@ -300,9 +300,10 @@ NewMap new_map(bool reset, double scaled) {
   run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
     const double s = seconds(t.drive, e.sample.odometry.t_us);
     watch(f, e);
-    if (const auto restart = fusion.take_restart()) {
+    if (fusion.asks_restart()) {
+      const VisionRestart restart = fusion.take_restart(fusion.fused());
       m.asked_at.push_back(s);
-      if (T_vo_vehicle) m.restart_off = (restart->T_vo_vehicle.p - T_vo_vehicle->p).head<2>().norm();
+      if (T_vo_vehicle) m.restart_off = (restart.T_vo_vehicle.p - T_vo_vehicle->p).head<2>().norm();
     }
     if (e.sample.channel != FusionChannel::kVo || s < 52.95 || s > 57.95) return;
     T_vo_vehicle = e.sample.odometry.T_frame_vehicle;
