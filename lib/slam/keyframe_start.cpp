@@ -49,7 +49,7 @@ TrackState KeyframeTracker::without_map(int64_t t_us, bool able) {
   return lost ? TrackState::kLost : TrackState::kInitialising;
 }
 
-void KeyframeTracker::begin_map(int64_t t_us, const std::optional<Motion>& motion, const Matrix6d& cov_motion) {
+void KeyframeTracker::begin_map(int64_t t_us, const std::optional<FrameMotion>& motion, const Matrix6d& cov_motion) {
   if (t_good_us_) {  // after a loss: the way that nobody saw is missing
     continuous_ = found_back_;
     const double unseen_s = seconds_between(*t_good_us_, t_us);
@@ -87,7 +87,7 @@ int KeyframeTracker::count_landmarks(const std::vector<KeyframeFeature>& feature
 
 void KeyframeTracker::begin_start(const CameraFrame& frame, const std::vector<Feature>& features) {
   find_back(frame);
-  start_ = Start{};
+  start_ = MonoStart{};
   start_->t_us = frame.t_us;
   note_attitude(frame.t_us);
   std::vector<Feature> all = features;
@@ -189,8 +189,8 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   cov_own_.setZero();
   begin_bundle();
   finish_bundle();
-  const Motion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_,
-                     seconds_between(start_->t_us, frame.t_us)};
+  const FrameMotion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_,
+                          seconds_between(start_->t_us, frame.t_us)};
   start_.reset();
   begin_map(frame.t_us, going, cov_own_);
 }

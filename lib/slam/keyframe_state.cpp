@@ -89,7 +89,7 @@ void KeyframeTracker::arrive(int64_t t_us) {
         carried(cov_keyframe_, T_local_anchor, T_local_anchor.inverse() * map_.last().T_map_camera) + cov_own_;
   } else {
     const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
-    motion_ = Motion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
+    motion_ = FrameMotion{{Eigen::Quaterniond::Identity(), T_camera_vehicle.q * restart_.velocity}, 1.0};
     continuous_ = false;
     t_good_us_.reset();
     t_able_us_.reset();

@@ -212,7 +212,7 @@ bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_p
 }
 
 void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera) {
-  if (t_us_) motion_ = Motion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
+  if (t_us_) motion_ = FrameMotion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
   settle(t_us, T_map_camera, cov_camera, 2.0 * cov_camera);
 }
 

@@ -89,6 +89,28 @@ struct Restart {
   }
 };
 
+/// The camera's motion over the last frame.
+struct FrameMotion {
+  SE3 T_before_now;
+  double dt_s = 0.0;
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.T_before_now, self.dt_s);
+  }
+};
+
+/// The first picture of a start without stereo.
+struct MonoStart {
+  int64_t t_us = 0;
+  std::map<int64_t, Eigen::Vector2d> seen;  ///< normalised, by track
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.t_us, self.seen);
+  }
+};
+
 class KeyframeTracker {
  public:
   /// `right_finder`: for simulated tracks; without it pictures are matched.
@@ -128,15 +150,6 @@ class KeyframeTracker {
   [[nodiscard]] const LensCorrection& lens() const { return map_.lens(); }
 
  private:
-  struct Motion {
-    SE3 T_before_now;  ///< of the camera, over the last frame
-    double dt_s = 0.0;
-
-    template <class Self, class Archive>
-    static void members(Self& self, Archive& archive) {
-      archive(self.T_before_now, self.dt_s);
-    }
-  };
   struct Attitude {
     int64_t t_us = 0;
     Eigen::Quaterniond q_map_vehicle = Eigen::Quaterniond::Identity();
@@ -144,15 +157,6 @@ class KeyframeTracker {
     template <class Self, class Archive>
     static void members(Self& self, Archive& archive) {
       archive(self.t_us, self.q_map_vehicle.coeffs());
-    }
-  };
-  struct Start {  ///< the first picture of a start without stereo
-    int64_t t_us = 0;
-    std::map<int64_t, Eigen::Vector2d> seen;  ///< normalised, by track
-
-    template <class Self, class Archive>
-    static void members(Self& self, Archive& archive) {
-      archive(self.t_us, self.seen);
     }
   };
   struct Pairs {  ///< tracks in the first picture of a start and in this one, normalised
@@ -172,7 +176,7 @@ class KeyframeTracker {
   void wait_for_parallax(int64_t t_us, size_t points);
   void begin_start(const CameraFrame& frame, const std::vector<Feature>& features);
   void finish_start(const CameraFrame& frame, const Pairs& pairs);
-  void begin_map(int64_t t_us, const std::optional<Motion>& motion, const Matrix6d& cov_motion);
+  void begin_map(int64_t t_us, const std::optional<FrameMotion>& motion, const Matrix6d& cov_motion);
   /// Way of the vehicle, with the source that knows it best; nothing where none does or none is wanted.
   struct KnownTravel {
     Travel travel;
@@ -234,8 +238,8 @@ class KeyframeTracker {
   std::optional<int64_t> t_us_;
   std::optional<int64_t> t_good_us_;  ///< of the last frame with a pose
   std::optional<int64_t> t_able_us_;  ///< of the last frame that could begin a map, or of the first to try
-  std::optional<Motion> motion_;
-  std::optional<Start> start_;
+  std::optional<FrameMotion> motion_;
+  std::optional<MonoStart> start_;
   std::map<int64_t, Eigen::Vector2f> pixels_;  ///< of the live tracks in the last picture
   int landmarks_at_keyframe_ = 0;
   double found_share_ = 1.0;     ///< of a keyframe's landmarks, in the picture after it: the front end's own, a mean

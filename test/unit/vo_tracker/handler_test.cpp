@@ -79,7 +79,7 @@ TEST_CASE("a restart takes effect half a second after its time, on whatever fram
 
   all.back().arrival_us = 0;
   std::vector<Sent> late = pictures();  // asked for too late: in the ledger, and unused
-  late.insert(late.begin() + 2 * 30, sent("VO_RESTART", kFrame_us * 20, 0, m));
+  late.insert(late.begin() + std::ptrdiff_t{2} * 30, sent("VO_RESTART", kFrame_us * 20, 0, m));
   const Collector out = run(late, true);
   CHECK(out.all<pose_t>("POSE_VO").back().reset_counter == 0);
   CHECK(out.messages.contains("LEDGER_VO_TRACKER"));
@@ -87,13 +87,13 @@ TEST_CASE("a restart takes effect half a second after its time, on whatever fram
 
 TEST_CASE("lost, corrupt and blank pictures are survived and named") {
   std::vector<Sent> all = pictures();
-  image_t broken = decode<image_t>(all[2 * 20].bytes);
+  image_t broken = decode<image_t>(all[std::size_t{2} * 20].bytes);
   std::fill(broken.data.begin() + 40, broken.data.end(), uint8_t{0x55});
-  all[2 * 20].bytes = encode(broken);
-  all[2 * 30].bytes =
+  all[std::size_t{2} * 20].bytes = encode(broken);
+  all[std::size_t{2} * 30].bytes =
       sent("CAMERA_LEFT", kFrame_us * 31, 30, picture_message(cv::Mat::zeros(kHeight, kWidth, CV_8UC1))).bytes;
-  all.erase(all.begin() + 2 * 40);  // a left picture
-  all.erase(all.begin() + 2 * 50);  // a right one, by now at this place
+  all.erase(all.begin() + std::ptrdiff_t{2} * 40);  // a left picture
+  all.erase(all.begin() + std::ptrdiff_t{2} * 50);  // a right one, by now at this place
   const Collector out = run(all, true);
   const auto poses = out.all<pose_t>("POSE_VO");
   const auto statuses = out.all<vo_status_t>("VO_STATUS");

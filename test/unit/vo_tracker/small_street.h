@@ -58,7 +58,7 @@ inline const std::vector<Sent>& pictures() {
 /// Wheel speeds at 50 Hz, up to `late_us` late.
 inline std::vector<Sent> with_wheels(std::vector<Sent> all, int64_t late_us) {
   for (int i = 0; i < 5 * kFrames; ++i) {
-    const int64_t t = 20'000 * (i + 1);
+    const int64_t t = int64_t{20'000} * (i + 1);
     wheels_t m{};
     m.num_speeds = 1;
     m.direction = wheels_t::DIRECTION_SIGNED;
