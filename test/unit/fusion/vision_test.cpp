@@ -226,11 +226,13 @@ double scale_learnt(double faster, double longer, bool with_ins) {
 
 TEST_CASE("a vision alone learns no scale from itself, whatever its velocities say") {
   for (const double faster : {1.0, 0.85}) {
-    INFO("velocities by " << faster << ": " << scale_learnt(faster, 1.0, false));
-    CHECK(std::abs(scale_learnt(faster, 1.0, false)) < 0.03);  // its own sigma before anybody has told
+    const double alone = scale_learnt(faster, 1.0, false);
+    INFO("velocities by " << faster << ": " << alone);
+    CHECK(std::abs(alone) < 0.03);  // its own sigma before anybody has told
   }
-  INFO("beside an INS: " << scale_learnt(1.0, 1.05, true));
-  CHECK(std::abs(scale_learnt(1.0, 1.05, true) - std::log(1.05)) < 0.01);  // teeth: who can tell it teaches it
+  const double beside_ins = scale_learnt(1.0, 1.05, true);
+  INFO("beside an INS: " << beside_ins);
+  CHECK(std::abs(beside_ins - std::log(1.05)) < 0.01);  // teeth: who can tell it teaches it
 }
 
 /// Yaw error at the end of a tunnel beside a vision of the same gyro, whose bias the INS has wrong by 0.003 rad/s and
