@@ -52,7 +52,7 @@ std::optional<Similarity> align_yaw(const Moments& m) {
 /// Umeyama 1991, equations (40) to (43).
 std::optional<Similarity> align_umeyama(const Moments& m, bool with_scale) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d d = svd.singularValues();
+  const Eigen::Vector3d& d = svd.singularValues();
   if (d(1) <= kRankTolerance * d(0)) return std::nullopt;
   Eigen::Vector3d s = Eigen::Vector3d::Ones();
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) s(2) = -1.0;

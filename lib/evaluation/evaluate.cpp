@@ -6,8 +6,8 @@
 namespace roadfix {
 namespace {
 
-constexpr double kLargestDelay_s = 2.0;
 constexpr double kDelayStep_s = 0.05;
+constexpr int kDelaySteps = 40;  ///< to either side
 constexpr double kDelayPrecision_s = 1e-4;
 constexpr int64_t kPathInterval_us = 100'000;
 
@@ -72,7 +72,8 @@ double fitted_delay(const Reference& reference, const DriveFacts& facts, const T
   };
   double best_s = 0.0;
   double best = cost(0.0);
-  for (double delay_s = -kLargestDelay_s; delay_s <= kLargestDelay_s; delay_s += kDelayStep_s) {
+  for (int step = -kDelaySteps; step <= kDelaySteps; ++step) {
+    const double delay_s = step * kDelayStep_s;
     const double value = cost(delay_s);
     if (value < best) {
       best = value;

@@ -35,7 +35,8 @@ Eigen::Vector2f approach(const FlowPyramid& first, const FlowPyramid& second, co
   for (size_t level = std::min(first.levels.size(), second.levels.size()) - 1; level > 0; --level) {
     const float shrink = 1.0F / static_cast<float>(1 << level);
     const cv::Mat& gray = first.picture(level);
-    const auto reach = static_cast<float>(window_px / 2 + kMargin);
+    const int reach_px = window_px / 2 + kMargin;
+    const auto reach = static_cast<float>(reach_px);
     const Eigen::Vector2f wanted = shrink * from,
                           last(static_cast<float>(gray.cols - 1) - reach, static_cast<float>(gray.rows - 1) - reach);
     const Eigen::Vector2f inside = wanted.cwiseMin(last).cwiseMax(reach);  // beside a point near the edge

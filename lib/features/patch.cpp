@@ -53,12 +53,13 @@ void centre(float* pixels, int count) {
 /// zero.
 template <int N>
 void read_pixels(const Patch& patch, int side, PatchModel<N>& m) {
-  const int n = padded(m.count), stride = side + 2, half = side / 2;
+  const ptrdiff_t n = padded(m.count), stride = side + 2;
+  const int half = side / 2;
   m.pixels.assign(static_cast<size_t>((N + 1) * n), 0.0F);
   const float edge = 1.0F / static_cast<float>(std::max(1, half));
   float* out = m.pixels.data();
   for (int row = 0; row < side; ++row) {
-    const uint8_t* line = patch.grey.data() + static_cast<ptrdiff_t>(row + 1) * stride + 1;
+    const uint8_t* line = patch.grey.data() + (row + 1) * stride + 1;
     const float y = static_cast<float>(row - half) * edge;
     for (int column = 0; column < side; ++column, ++out) {
       const float x = static_cast<float>(column - half) * edge;
@@ -125,7 +126,8 @@ struct Grid {
 /// so that all but the loads themselves run in vector registers.
 bool sample(const cv::Mat& gray, const Placement& place, int side, const Grid& grid, Pixels& out) {
   constexpr float kEdge = 0.01F;  // px, for rounding
-  const Eigen::Vector2f reach = place.shape.cwiseAbs().rowwise().sum() * static_cast<float>(side / 2);
+  const int half = side / 2;
+  const Eigen::Vector2f reach = place.shape.cwiseAbs().rowwise().sum() * static_cast<float>(half);
   const Eigen::Vector2f low = place.centre - reach, high = place.centre + reach;
   if (!(low.x() >= kEdge && low.y() >= kEdge && high.x() < static_cast<float>(gray.cols - 1) - kEdge &&
         high.y() < static_cast<float>(gray.rows - 1) - kEdge)) {
@@ -178,8 +180,8 @@ class Stretch {
 template <int N>
 std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::Mat& gray, const Placement& start,
                                const PatchConfig& config) {
-  const int side = config.window_px;
-  const auto half = static_cast<float>(side / 2);
+  const int side = config.window_px, half_px = side / 2;
+  const auto half = static_cast<float>(half_px);
   const float reach = config.reach_px > 0.0F ? config.reach_px : 2.0F * half;
   const float edge_std = half * static_cast<float>(config.shape_std);
   const float prior = N == 6 ? kGreyNoise * kGreyNoise / (edge_std * edge_std) : 0.0F;
@@ -233,7 +235,8 @@ std::optional<Patch> cut_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel
   if (u < reach || v < reach || u >= gray.cols - reach || v >= gray.rows - reach) return std::nullopt;
   Patch patch;
   patch.offset = pixel - Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
-  patch.grey.reserve(static_cast<size_t>((window_px + 2) * (window_px + 2)));
+  const auto side = static_cast<size_t>(window_px) + 2;
+  patch.grey.reserve(side * side);
   for (int row = v - reach; row <= v + reach; ++row) {
     const uint8_t* line = gray.ptr<uint8_t>(row) + u;
     patch.grey.insert(patch.grey.end(), line - reach, line + reach + 1);

@@ -14,7 +14,8 @@ constexpr int kSearchLevel = 1;   ///< of the pyramid: half the size
 constexpr int kSearchHalf = 4;    ///< patches of 9 x 9 pixels at that level
 constexpr float kNear_px = 3.0F;  ///< from a known depth or the coarse search; farther off it goes from coarse to fine
 
-constexpr int kSide = 2 * kSearchHalf + 1, kPatch = kSide * kSide;
+constexpr size_t kSide = 2 * kSearchHalf + 1;
+constexpr int64_t kPatch = kSide * kSide;
 constexpr int kLanes = 8;  ///< columns that run side by side; the ninth goes by itself
 
 /// A patch of the left picture, and how alike places of the right one are. Integers: exact up to one division.
@@ -22,10 +23,10 @@ class Searched {
  public:
   /// Around (u, v), which fits().
   Searched(const cv::Mat& gray, int u, int v) {
-    for (int row = 0; row < kSide; ++row) {
-      const uint8_t* line = gray.ptr<uint8_t>(v - kSearchHalf + row) + (u - kSearchHalf);
-      for (int column = 0; column < kSide; ++column) {
-        const int value = value_[static_cast<size_t>(row * kSide + column)] = line[column];
+    for (size_t row = 0; row < kSide; ++row) {
+      const uint8_t* line = gray.ptr<uint8_t>(v - kSearchHalf + static_cast<int>(row)) + (u - kSearchHalf);
+      for (size_t column = 0; column < kSide; ++column) {
+        const int value = value_[row * kSide + column] = line[column];
         sum_ += value;
         variance_ += value * value;
       }
@@ -40,8 +41,8 @@ class Searched {
   [[nodiscard]] double correlation(const cv::Mat& gray, int u, int v) const {
     std::array<int32_t, kLanes> sums{}, squares{}, products{};
     int64_t sum = 0, square = 0, product = 0;
-    for (int row = 0; row < kSide; ++row) {
-      const uint8_t* line = gray.ptr<uint8_t>(v - kSearchHalf + row) + (u - kSearchHalf);
+    for (size_t row = 0; row < kSide; ++row) {
+      const uint8_t* line = gray.ptr<uint8_t>(v - kSearchHalf + static_cast<int>(row)) + (u - kSearchHalf);
       const int32_t* mine = value_.data() + row * kSide;
       for (size_t k = 0; k < kLanes; ++k) {
         const int32_t value = line[k];

@@ -12,9 +12,9 @@ constexpr double kLongestGap = 0.5;  ///< s between two samples of one channel t
 }  // namespace
 
 void Outlook::see(const ChannelSample& s) {
-  const Step* before = !ahead_.empty() ? &ahead_.back() : last_ ? &*last_ : nullptr;
+  const OutlookStep* before = !ahead_.empty() ? &ahead_.back() : last_ ? &*last_ : nullptr;
   if (before != nullptr && s.odometry.t_us <= before->t_us) return;
-  Step step;
+  OutlookStep step;
   step.t_us = s.odometry.t_us;
   step.channel = s.channel;
   step.metric = s.metric;
@@ -47,8 +47,8 @@ void Outlook::drop_until(int64_t t_us) {
 
 Fusion::Poses Outlook::poses(const Fusion& fusion) const {
   if (ahead_.empty() || ahead_.back().t_us <= fusion.t_us()) return fusion.carried({});
-  const Step& first = ahead_.front();
-  const Step& newest = ahead_.back();
+  const OutlookStep& first = ahead_.front();
+  const OutlookStep& newest = ahead_.back();
   Fusion::Ahead a;
   a.dt = seconds_between(fusion.t_us(), newest.t_us);
   a.channel = newest.channel;
@@ -81,7 +81,7 @@ ReturnState Outlook::returned(const Fusion& fusion, bool follows) const {
   ReturnState back = fusion.comeback();
   back.fixes_in_row = 0;
   int64_t t_us = fusion.t_us();
-  for (const Step& step : ahead_) {
+  for (const OutlookStep& step : ahead_) {
     let_return(back, config, std::max(0.0, seconds_between(t_us, step.t_us)));
     t_us = step.t_us;
     if (follows) take_fix(back, config, step.correction, false);

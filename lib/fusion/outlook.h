@@ -8,6 +8,20 @@
 
 namespace roadfix {
 
+/// The way up to a sample, summed up from some sample on: differences alone count.
+struct OutlookStep {
+  int64_t t_us = 0;
+  FusionChannel channel = FusionChannel::kIns;
+  bool metric = true;
+  bool known = false;  ///< the sample itself was valid
+  Odometry felt;
+  LevelView view;  ///< of felt
+  Planar way = Planar::Zero();
+  double rise = 0.0;                   ///< m
+  double silent = 0.0;                 ///< s in which nobody told the motion
+  Planar correction = Planar::Zero();  ///< by which the sample's pose is not where the velocities lead
+};
+
 class Outlook {
  public:
   /// A clock sample, ahead of the fusion. Samples come in the order of their times.
@@ -24,25 +38,12 @@ class Outlook {
 
  private:
   [[nodiscard]] ReturnState returned(const Fusion& fusion, bool follows) const;
-  /// The way up to a sample, summed up from some sample on: differences alone count.
-  struct Step {
-    int64_t t_us = 0;
-    FusionChannel channel = FusionChannel::kIns;
-    bool metric = true;
-    bool known = false;  ///< the sample itself was valid
-    Odometry felt;
-    LevelView view;  ///< of felt
-    Planar way = Planar::Zero();
-    double rise = 0.0;                   ///< m
-    double silent = 0.0;                 ///< s in which nobody told the motion
-    Planar correction = Planar::Zero();  ///< by which the sample's pose is not where the velocities lead
-  };
 
   template <class Self, class Visitor>
   static void visit_step(Self& step, const Visitor& visit);
 
-  std::optional<Step> last_;  ///< the newest of those dropped
-  std::deque<Step> ahead_;
+  std::optional<OutlookStep> last_;  ///< the newest of those dropped
+  std::deque<OutlookStep> ahead_;
 };
 
 }  // namespace roadfix

@@ -44,8 +44,8 @@ class Lister {
       for (const SchemaDim& dim : field.dims) {
         sizes.push_back(dim.field >= 0 ? counts[static_cast<std::size_t>(dim.field)] : dim.fixed);
       }
-      if (field.dims.empty() && field.type.starts_with("int")) {
-        const int bytes = primitive_bytes(field.type);
+      const int bytes = field.type.starts_with("int") ? primitive_bytes(field.type) : 0;  // a struct may begin so too
+      if (field.dims.empty() && bytes > 0) {
         const int unused_bits = 64 - 8 * bytes;
         counts[i] = static_cast<int64_t>(read_big_endian(rest_.data(), bytes) << unused_bits) >> unused_bits;
       }
