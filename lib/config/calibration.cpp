@@ -99,6 +99,12 @@ void visit(CameraCalibration& c, Visitor& v) {
 }
 
 template <class Visitor>
+void visit(StereoCalibration& c, Visitor& v) {
+  v.optional_number("scale_std", c.scale_std, 0.0, 1.0);
+  v.optional_number("focal_std", c.focal_std, 0.0, 1.0);
+}
+
+template <class Visitor>
 void visit(SensorsCalibration& c, Visitor& v) {
   v.optional_group("imu", c.imu);
   v.optional_group("gnss", c.gnss);
@@ -106,6 +112,7 @@ void visit(SensorsCalibration& c, Visitor& v) {
   v.optional_group("mag", c.mag);
   v.optional_group("camera_left", c.camera_left);
   v.optional_group("camera_right", c.camera_right);
+  v.optional_group("stereo", c.stereo);
 }
 
 template <class Visitor>

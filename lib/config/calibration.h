@@ -82,6 +82,12 @@ struct CameraCalibration {
   std::optional<CameraMounting> mounting;
 };
 
+/// How well two eyes together are calibrated. Pictures tell neither.
+struct StereoCalibration {
+  std::optional<double> scale_std;  ///< relative, of lengths: of focal length times distance of the eyes
+  std::optional<double> focal_std;  ///< relative, of the focal length: of angles
+};
+
 /// An absent sensor is one that the vehicle does not have, or about which nothing is known.
 struct SensorsCalibration {
   std::optional<ImuCalibration> imu;
@@ -90,6 +96,7 @@ struct SensorsCalibration {
   std::optional<MagCalibration> mag;
   std::optional<CameraCalibration> camera_left;
   std::optional<CameraCalibration> camera_right;
+  std::optional<StereoCalibration> stereo;
 };
 
 struct MountingCalibration {

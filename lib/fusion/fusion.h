@@ -25,7 +25,7 @@ inline constexpr int kFusionChannels = 3;
 
 struct ChannelSample {
   FusionChannel channel = FusionChannel::kIns;
-  Odometry odometry;
+  Odometry odometry;  ///< covariances without what the channel's whole way has in common: without_common()
   int reset_counter = 0;
   bool metric = true;       ///< false: lengths are up to a common factor
   bool shares_imu = false;  ///< its yaw comes from the gyro that the INS uses

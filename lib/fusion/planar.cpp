@@ -65,6 +65,25 @@ Odometry in_other_frame(const SE3& T_other_frame, const Odometry& o) {
   return moved;
 }
 
+namespace {
+
+/// P - C C', C made shorter where P does not hold as much.
+template <int N, int M>
+void take_out(const Eigen::Matrix<double, N, M>& C, Eigen::Matrix<double, N, N>& P) {
+  if (C.isZero(0.0)) return;
+  const Eigen::Matrix<double, M, M> share = C.transpose() * P.ldlt().solve(C);
+  const double held = Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, M, M>>(share).eigenvalues().maxCoeff();
+  if (std::isfinite(held)) P -= C * C.transpose() / std::max(1.0, held);
+}
+
+}  // namespace
+
+Odometry without_common(Odometry o, const CommonError& common) {
+  take_out<6, 2>(common.columns, o.cov_pose);
+  take_out<3, 1>(common.scale_std * o.velocity, o.cov_velocity);
+  return o;
+}
+
 Planar difference_of(const Planar& a, const Planar& b) {
   const Planar d = a - b;
   return {d.x(), d.y(), wrap_angle(d.z())};

@@ -66,6 +66,15 @@ struct PlanarEstimate {
 PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
                            const Eigen::Matrix3d& P_end);
 
+/// What all lengths and turns of a vision's way have wrong alike, by its calibration.
+struct CommonError {
+  Eigen::Matrix<double, 6, 2> columns = Eigen::Matrix<double, 6, 2>::Zero();  ///< of its pose, per sigma
+  double scale_std = 0.0;                                                     ///< of its velocity, relative
+};
+/// The pose with covariances that do not hold that any more: it is one scale and one drift here, not new in each step.
+/// At most as much of it is taken out as there is.
+Odometry without_common(Odometry o, const CommonError& common);
+
 /// Least variance that a height gains on a way, m2.
 double height_growth(double way, double dt);
 

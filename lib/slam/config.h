@@ -5,6 +5,7 @@
 #include "features/front_end.h"
 #include "features/stereo_matcher.h"
 #include "geometry/se3.h"
+#include "slam/shared_error.h"
 
 namespace roadfix {
 
@@ -14,6 +15,10 @@ struct CameraRig {
   SE3 T_vehicle_left;
   std::optional<CameraIntrinsics> right;
   SE3 T_right_left;
+  /// With two eyes, how well lengths (focal length times distance of the eyes) and turns (focal length) are known,
+  /// which pictures cannot tell. Where nobody says: rectified pairs are off by a hundredth (Cvisic et al.,
+  /// Recalibrating the KITTI dataset camera setup, 2021), a focal length from a board by a few thousandths.
+  SharedDoubt doubt{0.01, 0.003};
 };
 
 /// Where mono takes its scale from; kAuto: the INS where it knows its speed better than the wheels do.

@@ -42,6 +42,8 @@ void KeyframeTracker::turn_map(const Eigen::Quaterniond& q, double sigma) {
   cov_keyframe_ = turn.covariance(cov_keyframe_, T_known);
   cov_own_ = in_map(cov_own_, {q, {}, 1.0});
   cov_closed_ = turn.covariance(cov_closed_, loops_.S_map_odom().rigid() * T_known);
+  shared_.move(turn.transform());
+  shared_closed_.move(turn.transform());
   levelled_ = true;
   attitudes_.clear();
   if (!t_good_us_) return;  // nobody has seen a pose yet

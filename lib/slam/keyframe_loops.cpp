@@ -34,7 +34,7 @@ PlaceView KeyframeTracker::view_of(const cv::Mat& gray, const std::vector<Featur
   PlaceView view;
   view.t_us = t_us;
   view.T_odom_camera = T_map_camera_;
-  view.cov = cov_closed_;
+  view.cov = cov_closed_ + shared_closed_.cov();
   const SE3 T_camera_map = T_map_camera_.inverse();
   for (size_t row = 0; row < described.index.size(); ++row) {
     const size_t i = described.index[row];
@@ -55,8 +55,9 @@ void KeyframeTracker::remember_place(const CameraFrame& frame, const std::vector
   const bool closed = loops_.visit(view_of(frame.left, features, frame.t_us), continuous_);
   continuous_ = true;
   if (!closed) return;
-  cov_closed_ = loops_.cov_after_loop();
+  cov_closed_ = loops_.cov_after_loop();  // with what the place shared with the way to it
   const Sim3 odom{T_map_camera_.q, T_map_camera_.p, 1.0};
+  shared_closed_.begin_at((loops_.S_map_odom() * odom).rigid());
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
   const SE3 was = (before * odom).rigid() * T_camera_vehicle,
             is = (loops_.S_map_odom() * odom).rigid() * T_camera_vehicle;

@@ -73,6 +73,8 @@ void KeyframeTracker::arrive(int64_t t_us) {
   T_local_vehicle.p += dt_s * (T_local_vehicle.q * restart_.velocity);
   const SE3 T_local_anchor = T_local_vehicle * rig_.T_vehicle_left;
   move_to(T_local_anchor * anchor->T_map_camera.inverse());
+  shared_.begin_at(T_local_anchor);  // the pose given has errors of its own
+  shared_closed_.begin_at(T_local_anchor);
   // Unseen turning and braking until there, as generous as the ramp of a street corner.
   constexpr double kTurnRate = 0.2;      // rad/s
   constexpr double kAcceleration = 1.0;  // m/s2
@@ -174,6 +176,14 @@ void KeyframeTracker::take_scale() {
   }
 }
 
+SharedColumns KeyframeTracker::shared_error_at(int64_t t_us) const {
+  if (!t_us_ || t_us == *t_us_ || out_.odometry.validity == Validity::kInvalid) return out_.shared_error;
+  const SE3 T_predicted = predict(t_us);
+  SharedError shared = shared_;
+  shared.go_to(T_predicted, shared_doubt());
+  return carried_by(T_predicted, rig_.T_vehicle_left.inverse()) * shared.columns();
+}
+
 Odometry KeyframeTracker::at(int64_t t_us) const {
   Odometry o = out_.odometry;
   o.t_us = t_us;
@@ -189,6 +199,8 @@ Odometry KeyframeTracker::at(int64_t t_us) const {
   o.cov_pose.topLeftCorner<3, 3>() +=
       dt_s * dt_s * o.T_frame_vehicle.R() * o.cov_velocity * o.T_frame_vehicle.R().transpose();
   o.cov_pose.topLeftCorner<3, 3>().diagonal().array() += slip * slip;
+  const SharedColumns shared = shared_error_at(t_us);
+  o.cov_pose += shared * shared.transpose() - out_.shared_error * out_.shared_error.transpose();
   return o;
 }
 
@@ -196,6 +208,7 @@ void KeyframeTracker::digest(Digest& digest) const {
   digest.add(T_map_camera_.q.coeffs());
   digest.add(T_map_camera_.p);
   digest.add(cov_keyframe_);
+  digest.add(shared_.columns());
   digest.add(loops_.S_map_odom().p);
   digest.add(loops_.S_map_odom().q.coeffs());
   digest.add(map_.lens().value);
@@ -210,11 +223,12 @@ void KeyframeTracker::members(Tracker& self, Archive& archive) {
   archive(odometry.t_us, odometry.T_frame_vehicle, odometry.velocity, odometry.angular_rate, odometry.cov_pose,
           odometry.cov_velocity, odometry.validity);
   archive(out.state, out.reason, out.reset_counter, out.reset_delta, out.cov_closed, out.closed_reset_counter,
-          out.closed_reset_delta);
+          out.closed_reset_delta, out.shared_error);
   archive(self.T_map_camera_, self.t_us_, self.t_good_us_, self.t_able_us_, self.motion_, self.start_, self.pixels_,
           self.landmarks_at_keyframe_, self.found_share_, self.after_keyframe_);
   archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
           self.scale_std_, self.restarted_, self.restart_);
+  archive(self.shared_, self.shared_closed_);
   archive(self.new_levels_, self.attitudes_, self.levelled_, self.cov_own_, self.t_begun_us_, self.first_place_);
 }
 

@@ -13,10 +13,6 @@
 namespace roadfix {
 namespace {
 
-/// Relative, of focal length times distance of the eyes as calibrations come; pictures cannot tell it. Rectified pairs
-/// are off by about this much (Cvisic et al., Recalibrating the KITTI dataset camera setup, 2021).
-constexpr double kStereoScaleStd = 0.01;
-
 constexpr double kUnknownSpeed = 30.0;  ///< m/s, standard deviation where there is a pose but no motion yet
 
 constexpr double kBraking = 4.0;       ///< m/s2, firm
@@ -106,7 +102,7 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   }
   t_us_ = frame.t_us;
   out_.scale = stereo_ ? ScaleSource::kStereo : scale_;
-  out_.scale_std = stereo_ ? kStereoScaleStd : scale_std_;
+  out_.scale_std = shared_doubt().lengths;
   out_.num_keyframes = map_.num_keyframes_ever();
   out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
   out_.num_loops = loops_.num_loops();
@@ -222,30 +218,50 @@ void KeyframeTracker::settle(int64_t t_us, const SE3& T_map_camera, const Matrix
   T_map_camera_ = T_map_camera;
   t_good_us_ = t_us;
   note_attitude(t_us);
-  const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
-  const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
-  const Matrix6d cov = carried(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
+  tell_pose(T_map_camera, cov_camera);
   Odometry& o = out_.odometry;
-  o.T_frame_vehicle = T_map_camera * T_camera_vehicle;
-  o.cov_pose = vehicle_covariance(cov, T_map_camera, T_camera_vehicle);
-  const Sim3& S_map_odom = loops_.S_map_odom();
-  const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
-  const Matrix6d cov_closed = carried(cov_closed_, T_closed_keyframe, T_keyframe_now) + in_map(cov_camera, S_map_odom);
-  out_.cov_closed = vehicle_covariance(cov_closed, S_map_odom.rigid() * T_map_camera, T_camera_vehicle);
   o.validity = Validity::kValid;
   o.cov_velocity = kUnknownSpeed * kUnknownSpeed * Eigen::Matrix3d::Identity();
   if (motion_ && motion_->dt_s > 0.0) {
-    tell_motion();
-    const Matrix6d cov_vehicle = vehicle_covariance(cov_motion, T_map_camera, T_camera_vehicle);
+    const Matrix6d cov_vehicle = carried(cov_motion, T_map_camera, rig_.T_vehicle_left.inverse());
     const Eigen::Matrix3d R = o.T_frame_vehicle.R();
-    o.cov_velocity = R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s);
+    tell_motion(R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s));
   }
 }
 
-void KeyframeTracker::tell_motion() {
+/// What lengths and turns are known to, all along the way.
+SharedDoubt KeyframeTracker::shared_doubt() const {
+  if (stereo_) return rig_.doubt;
+  return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, 0.0};  // mono's focal length is learnt
+}
+
+/// A pose and its covariances: what the map knows, carried here, what this picture adds, `cov_camera`, and what the
+/// whole way shares.
+void KeyframeTracker::tell_pose(const SE3& T_map_camera, const Matrix6d& cov_camera) {
+  const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
+  const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
+  const SharedDoubt doubt = shared_doubt();
+  shared_.go_to(T_map_camera, doubt);
+  const Matrix6d cov = carried(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
+  out_.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle;
+  out_.odometry.cov_pose = carried(cov + shared_.cov(), T_map_camera, T_camera_vehicle);
+  out_.shared_error = carried_by(T_map_camera, T_camera_vehicle) * shared_.columns();
+  const Sim3& S_map_odom = loops_.S_map_odom();
+  const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
+  const SE3 T_closed_camera = (S_map_odom * Sim3{T_map_camera.q, T_map_camera.p, 1.0}).rigid();
+  shared_closed_.go_to(T_closed_camera, doubt);
+  const Matrix6d cov_closed = carried(cov_closed_, T_closed_keyframe, T_keyframe_now) + in_map(cov_camera, S_map_odom);
+  out_.cov_closed = carried(cov_closed + shared_closed_.cov(), T_closed_camera, T_camera_vehicle);
+}
+
+/// The last motion as velocities; their covariance without what all lengths share.
+void KeyframeTracker::tell_motion(const Eigen::Matrix3d& cov_velocity) {
   const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * rig_.T_vehicle_left.inverse();
-  out_.odometry.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
-  out_.odometry.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
+  Odometry& o = out_.odometry;
+  o.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
+  o.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
+  const Eigen::Vector3d shared = shared_doubt().lengths * o.velocity;
+  o.cov_velocity = cov_velocity + shared * shared.transpose();
 }
 
 void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
@@ -269,14 +285,13 @@ void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
   T_map_camera_ = T_predicted;
   if (without_s < config_.lost_after_s) {
     out_.state = TrackState::kWeak;
-    out_.odometry.T_frame_vehicle = T_predicted * rig_.T_vehicle_left.inverse();
-    out_.odometry.cov_pose = Matrix6d::Identity() * (without_s * without_s);
+    tell_pose(T_predicted, Matrix6d::Identity() * (without_s * without_s));
     out_.odometry.validity = Validity::kCoasting;
     // By the motion of before, from which a braking car departs.
     const bool going = motion_ && motion_->dt_s > 0.0;
-    if (going) tell_motion();
     const double sigma = going ? kSeenSpeedStd + kBraking * without_s : kUnknownSpeed;
     out_.odometry.cov_velocity = sigma * sigma * Eigen::Matrix3d::Identity();
+    if (going) tell_motion(Eigen::Matrix3d(out_.odometry.cov_velocity));
     return;
   }
   out_.state = TrackState::kLost;

@@ -18,6 +18,7 @@
 #include "slam/local_map.h"
 #include "slam/loop_closer.h"
 #include "slam/pose_solver.h"
+#include "slam/shared_error.h"
 #include "slam/travel.h"
 #include "stream/digest.h"
 #include "stream/executor.h"
@@ -46,7 +47,9 @@ struct TrackedFrame {
   bool map_began = false;  ///< at this frame
   std::string reason;      ///< plain words, empty when good
   ScaleSource scale = ScaleSource::kNone;
-  double scale_std = 0.0;                  ///< relative, common to the whole way; meaningless where the source is none
+  double scale_std = 0.0;  ///< relative, common to the whole way; meaningless where the source is none
+  /// Error of odometry's pose per sigma of what the whole way shares; its square is in the covariances.
+  SharedColumns shared_error = SharedColumns::Zero();
   int reset_counter = 0;                   ///< +1 per jump of the pose
   SE3 reset_delta;                         ///< of the last jump: p is new minus old, q is q_old^-1 q_new
   Matrix6d cov_closed = Matrix6d::Zero();  ///< of the pose with all loops closed
@@ -138,6 +141,8 @@ class KeyframeTracker {
   [[nodiscard]] const TrackedFrame& last() const { return out_; }
   /// The last frame's pose carried to another time by the last motion; invalid where that is long after it.
   [[nodiscard]] Odometry at(int64_t t_us) const;
+  /// What that pose shares with the whole way.
+  [[nodiscard]] SharedColumns shared_error_at(int64_t t_us) const;
   /// The same pose with all loops closed.
   [[nodiscard]] Odometry closed(Odometry odometry) const;
 
@@ -210,7 +215,9 @@ class KeyframeTracker {
   [[nodiscard]] std::optional<Eigen::Vector2d> appears(const Eigen::Vector3d& p_camera) const;
   [[nodiscard]] std::vector<Feature> hints(const SE3& T_map_camera) const;
   [[nodiscard]] bool solve(const std::vector<Feature>& features, const SE3& T_predicted);
-  void tell_motion();
+  [[nodiscard]] SharedDoubt shared_doubt() const;
+  void tell_pose(const SE3& T_map_camera, const Matrix6d& cov_camera);
+  void tell_motion(const Eigen::Matrix3d& cov_velocity);
   void drop_wrong_tracks(const std::vector<Feature>& features);
   void learn_found_share();
   [[nodiscard]] std::vector<double> flows_beyond(const Eigen::Quaterniond& q_now_keyframe,
@@ -247,6 +254,7 @@ class KeyframeTracker {
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
   Matrix6d cov_own_ = Matrix6d::Zero();       ///< what of it this map has added
   Matrix6d cov_closed_ = Matrix6d::Zero();    ///< the same of the pose with all loops closed
+  SharedError shared_, shared_closed_;        ///< of the last pose told, and of it with all loops closed
   LoopCloser loops_;
   std::optional<int64_t> t_begun_us_;  ///< when the map began
   int64_t first_place_ = 0;            ///< of this map

@@ -4,17 +4,15 @@
 
 namespace roadfix {
 
-Matrix6d vehicle_covariance(const Matrix6d& cov_camera, const SE3& T_map_camera, const SE3& T_camera_vehicle) {
-  Matrix6d F = Matrix6d::Identity();
-  F.topRightCorner<3, 3>() = -T_map_camera.R() * skew(T_camera_vehicle.p);
-  F.bottomRightCorner<3, 3>() = T_camera_vehicle.R().transpose();
-  return F * cov_camera * F.transpose();
-}
-
-Matrix6d carried(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_before_now) {
+Matrix6d carried_by(const SE3& T_map_before, const SE3& T_before_now) {
   Matrix6d F = Matrix6d::Identity();
   F.topRightCorner<3, 3>() = -T_map_before.R() * skew(T_before_now.p);
   F.bottomRightCorner<3, 3>() = T_before_now.R().transpose();
+  return F;
+}
+
+Matrix6d carried(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_before_now) {
+  const Matrix6d F = carried_by(T_map_before, T_before_now);
   return F * cov * F.transpose();
 }
 

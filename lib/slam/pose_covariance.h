@@ -6,10 +6,11 @@
 
 namespace roadfix {
 
-/// How a camera pose's covariance becomes the vehicle's: the lever arm turns attitude error into position error.
-Matrix6d vehicle_covariance(const Matrix6d& cov_camera, const SE3& T_map_camera, const SE3& T_camera_vehicle);
+/// d error of a pose after the motion T_before_now, which is known exactly / d error before: attitude error becomes
+/// position error. A camera's pose becomes the vehicle's by the motion T_camera_vehicle.
+Matrix6d carried_by(const SE3& T_map_before, const SE3& T_before_now);
 
-/// Covariance of a pose after the motion T_before_now, which is known exactly: attitude error becomes position error.
+/// Covariance of a pose after that motion.
 Matrix6d carried(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_before_now);
 
 /// Covariance of a pose after the change of axes S.

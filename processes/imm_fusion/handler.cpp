@@ -67,7 +67,7 @@ class ImmFusionStage final : public Stage {
         take(decode<ins_status_t>(m.bytes));
         break;
       case kVoStatus:
-        vo_shares_imu_ = decode<vo_status_t>(m.bytes).mode == vo_status_t::MODE_MSCKF;
+        take(decode<vo_status_t>(m.bytes));
         break;
       default:
         fuse(channel_of(m.input), decode<pose_t>(m.bytes));
@@ -113,6 +113,8 @@ class ImmFusionStage final : public Stage {
       writer.put(c.jumps);
     }
     writer.put(vo_shares_imu_);
+    writer.put(vo_common_.columns);
+    writer.put(vo_common_.scale_std);
     writer.put(origin_);
     writer.put(anchor_.has_value());
     if (anchor_) {
@@ -133,6 +135,8 @@ class ImmFusionStage final : public Stage {
       reader.get(c.jumps);
     }
     reader.get(loaded.vo_shares_imu_);
+    reader.get(loaded.vo_common_.columns);
+    reader.get(loaded.vo_common_.scale_std);
     reader.get(loaded.origin_);
     if (reader.get<bool>()) {
       Geodetic& anchor = loaded.anchor_.emplace();
@@ -154,8 +158,14 @@ class ImmFusionStage final : public Stage {
                          {m.mounting_rad[2], m.mounting_rad[1], m.mounting_rad[0]});
   }
 
+  void take(const vo_status_t& m) {
+    vo_shares_imu_ = m.mode == vo_status_t::MODE_MSCKF;
+    vo_common_ = common_error(m);
+  }
+
   void fuse(FusionChannel channel, const pose_t& message) {
     ChannelSample sample = channel_sample(channel, message, message.seq);
+    if (channel == FusionChannel::kVo) sample.odometry = without_common(sample.odometry, vo_common_);
     sample.reset_counter = counts_[static_cast<std::size_t>(channel)].after(message);
     sample.shares_imu = channel == FusionChannel::kVo && vo_shares_imu_;
     if (channel == FusionChannel::kIns && sample.odometry.validity != Validity::kInvalid) {
@@ -193,6 +203,7 @@ class ImmFusionStage final : public Stage {
   std::optional<Geodetic> anchor_;
   int8_t origin_ = pose_t::ORIGIN_IMU;
   bool vo_shares_imu_ = false;
+  CommonError vo_common_;
   std::array<JumpCount, kFusionChannels> counts_;
   PublishSlot pose_slot_, state_slot_;
   std::vector<aiding_t> aidings_;  ///< since the last publish()

@@ -106,6 +106,15 @@ ChannelSample channel_sample(FusionChannel channel, const pose_t& m, int64_t seq
   return s;
 }
 
+CommonError common_error(const vo_status_t& m) {
+  CommonError e;
+  if (m.mode != vo_status_t::MODE_KEYFRAME) return e;
+  e.scale_std = m.scale_std;
+  for (int i = 0; i < e.columns.rows(); ++i)
+    for (int j = 0; j < e.columns.cols(); ++j) e.columns(i, j) = m.shared_error_m_rad[j][i];
+  return e;
+}
+
 Geodetic anchor_of(const pose_t& m) {
   return {m.anchor_lat_deg * kDegree, m.anchor_lon_deg * kDegree, m.anchor_height_m};
 }

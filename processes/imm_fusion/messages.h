@@ -5,6 +5,7 @@
 #include <roadfix/fusion_state_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
+#include <roadfix/vo_status_t.hpp>
 
 #include "fusion/fusion.h"
 
@@ -12,6 +13,7 @@ namespace roadfix {
 
 /// Everything but the count of resets, which is the caller's.
 ChannelSample channel_sample(FusionChannel channel, const pose_t& message, int64_t seq);
+CommonError common_error(const vo_status_t& message);
 Geodetic anchor_of(const pose_t& message);
 
 /// Pose, validity, state and resets; `anchor`: nothing before the first ENU pose.

@@ -101,7 +101,7 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   map_began_ = tracked_ && frame.map_began;
   if (!tracked_) return;  // a tick without a left picture: nothing new to say but the pose carried on
   tracked_ = false;
-  vo_status_t status = vo_status(frame, config_.keyframe.front_end.kind);
+  vo_status_t status = vo_status(frame, tracker_->shared_error_at(now_utime), config_.keyframe.front_end.kind);
   outputs.publish(kStatus, status);
   vo_features_t features = vo_features(frame);
   outputs.publish(kFeatures, features);

@@ -78,7 +78,7 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
   return m;
 }
 
-vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end) {
+vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end) {
   vo_status_t m{};
   m.mode = vo_status_t::MODE_KEYFRAME;
   m.state = static_cast<int8_t>(frame.state);
@@ -86,6 +86,8 @@ vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end) {
   m.front_end = name_of(front_end);
   m.scale_source = static_cast<int8_t>(frame.scale);
   m.scale_std = frame.scale_std;
+  for (int i = 0; i < shared.rows(); ++i)
+    for (int j = 0; j < shared.cols(); ++j) m.shared_error_m_rad[j][i] = shared(i, j);
   m.num_features = static_cast<int32_t>(frame.features.size());
   m.num_matches = frame.num_matches;
   m.num_inliers = frame.num_inliers;

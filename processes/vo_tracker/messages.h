@@ -14,7 +14,8 @@ namespace roadfix {
 pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin);
 /// The pose with all loops closed, with resets of its own.
 pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOrigin origin);
-vo_status_t vo_status(const TrackedFrame& frame, FrontEndKind front_end);
+/// `shared`: of the pose told beside it.
+vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end);
 vo_features_t vo_features(const TrackedFrame& frame);
 
 void set_reset(int counter, const SE3& delta, pose_t& message);

@@ -183,8 +183,10 @@ Calibration calibration_of(const ScenarioConfig& config) {
   if (config.camera.layout != CameraLayout::kNone) {
     const SE3 T_vehicle_left = nominal_T_vehicle_left(config.camera);
     c.sensors.camera_left = camera_calibration(config, T_vehicle_left);
-    if (config.camera.layout == CameraLayout::kStereo)
+    if (config.camera.layout == CameraLayout::kStereo) {
       c.sensors.camera_right = camera_calibration(config, T_vehicle_left * T_left_right(config.camera));
+      c.sensors.stereo = StereoCalibration{0.0, 0.0};  // the drive is rendered through these very lenses
+    }
   }
   return c;
 }

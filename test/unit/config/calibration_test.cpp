@@ -27,6 +27,7 @@ sensors:
     time_offset_std_s: 0.3
     stamp_jitter_s: 0.05
     T_body_camera: {p_m: [0.5, 0.1, 1.2], q_wxyz: [0.5, -0.5, 0.5, -0.5], std_m: 1.0, std_deg: 15}
+  stereo: {scale_std: 0.002, focal_std: 0.001}
 mounting: {std_deg: [5, 4, 3]}
 )";
 
@@ -40,6 +41,8 @@ TEST_CASE("a full calibration is read and written without loss") {
   CHECK(c.sensors.camera_left->distortion->coefficients.size() == 4);
   CHECK(c.sensors.camera_left->mounting->T_body_camera().q.coeffs() == Eigen::Vector4d(-0.5, 0.5, -0.5, 0.5));
   CHECK_FALSE(c.sensors.camera_right.has_value());
+  CHECK(c.sensors.stereo->scale_std == 0.002);
+  CHECK(c.sensors.stereo->focal_std == 0.001);
   CHECK(c.mounting->std_deg->z() == 3.0);
   const std::string text = calibration_text(c);
   CHECK(calibration_text(parse_calibration(text, "again")) == text);

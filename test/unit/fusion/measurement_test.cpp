@@ -226,6 +226,45 @@ TEST_CASE("growth of a covariance becomes the covariance of the motion, and lear
   CHECK((learnt - Eigen::Vector3d(1e-6, 1e-6, 1e-8).asDiagonal().toDenseMatrix()).norm() < 1e-12);
 }
 
+TEST_CASE("what a vision's whole way has in common is taken out of its covariance, and no more than is there") {
+  const auto at = [](double way) {  // 1 cm2 and 1e-6 rad2 per metre of its own
+    Odometry o;
+    o.velocity = {10.0, 0.2, 0.0};
+    Vector6d own;
+    own << Eigen::Vector3d::Constant(1e-4 * way), Eigen::Vector3d::Constant(1e-6 * way);
+    o.cov_pose = own.asDiagonal();
+    o.cov_velocity = 0.01 * Eigen::Matrix3d::Identity();
+    return o;
+  };
+  const auto common = [](double way) {
+    CommonError e;
+    e.columns.col(0) << 0.01 * way, 0.001 * way, 0.0, 0.0, 0.0, 0.0;
+    e.columns.col(1) << 0.0, 0.003 * way, 0.0, 0.0, 0.0, 0.004;
+    e.scale_std = 0.01;
+    return e;
+  };
+  const auto published = [&](double way) {
+    Odometry o = at(way);
+    o.cov_pose += common(way).columns * common(way).columns.transpose();
+    o.cov_velocity += 1e-4 * o.velocity * o.velocity.transpose();
+    return o;
+  };
+  const Odometry back = without_common(published(500.0), common(500.0));
+  CHECK(back.cov_pose.isApprox(at(500.0).cov_pose, 1e-9));
+  CHECK(back.cov_velocity.isApprox(at(500.0).cov_velocity, 1e-9));
+  // A step of a metre: its own part, and what it would be with the common part left in, 5 m long after 500.
+  const Planar motion(1.0, 0.0, 0.0);
+  const auto step = [&](auto&& of) {
+    return motion_covariance(Planar::Zero(), level_view(of(500.0)).P, motion, level_view(of(501.0)).P,
+                             Eigen::Vector3d::Constant(1e-5))(0, 0);
+  };
+  CHECK(step([&](double way) { return without_common(published(way), common(way)); }) == Approx(1e-4).epsilon(0.02));
+  CHECK(step(published) > 0.05);  // teeth
+  // A status was lost: what is told is not in there.
+  const Odometry kept = without_common(at(500.0), common(500.0));
+  CHECK(Eigen::SelfAdjointEigenSolver<Matrix6d>(kept.cov_pose).eigenvalues().minCoeff() > -1e-12);
+}
+
 TEST_CASE("velocities tell the motion without the jump") {
   Odometry a, b;
   b.t_us = 100'000;

@@ -24,6 +24,7 @@ class FedTracker {
     if (stereo) {
       rig.right = rig.left;
       rig.T_right_left = T_left_right(scenario.camera).inverse();
+      rig.doubt = {};
     }
     tracker_ = std::make_unique<KeyframeTracker>(config, rig, std::make_unique<SimulatedFrontEnd>(seen_), executor_,
                                                  std::make_unique<SimulatedRightEye>(seen_));

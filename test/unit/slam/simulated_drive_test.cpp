@@ -43,8 +43,10 @@ struct Drive {
 /// What the calibration that the tracker is given has wrong, and what the tracker thinks of it.
 struct Calibrated {
   double focal_error = 0.0;         ///< relative
+  double scale_error = 0.0;         ///< relative, of what stereo measures
   double right_shift_px = 0.0;      ///< of the right picture, sideways
   double right_turn_std_deg = 0.0;  ///< the tracker's doubt
+  SharedDoubt doubt = {};           ///< the same
 };
 
 Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calibrated) {
@@ -65,6 +67,8 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
   if (stereo) {
     rig.right = rig.left;
     rig.T_right_left = T_left_right.inverse();
+    rig.T_right_left.p *= (1.0 + calibrated.scale_error) / (1.0 + calibrated.focal_error);
+    rig.doubt = calibrated.doubt;
   }
   TrackConfig tracks;
   tracks.wanted = 250;
@@ -116,11 +120,12 @@ struct Drives {
   double nees = 0.0, error = 0.0, sigma = 0.0;  ///< mean, and two medians
 };
 
-Drives drives(int count, bool stereo, double noise_px, const Calibrated& calibrated = {}) {
+template <class CalibratedOf>
+Drives drives_of(int count, bool stereo, double noise_px, const CalibratedOf& calibrated_of) {
   Drives all;
   std::vector<double> errors, sigmas;
   for (int seed = 1; seed <= count; ++seed) {
-    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px, calibrated);
+    const Drive one = drive(static_cast<uint64_t>(seed), stereo, noise_px, calibrated_of(seed));
     CHECK(one.valid >= kFrames - 10);
     all.nees += one.nees / count;
     errors.push_back(one.error);
@@ -131,6 +136,10 @@ Drives drives(int count, bool stereo, double noise_px, const Calibrated& calibra
   all.error = errors[errors.size() / 2];
   all.sigma = sigmas[sigmas.size() / 2];
   return all;
+}
+
+Drives drives(int count, bool stereo, double noise_px, const Calibrated& calibrated = {}) {
+  return drives_of(count, stereo, noise_px, [&](int) { return calibrated; });
 }
 
 TEST_CASE("the covariance is that of the errors, whatever the noise", "[statistics]") {
@@ -148,14 +157,42 @@ TEST_CASE("the covariance is that of the errors, whatever the noise", "[statisti
   }
   CHECK(mean > 0.7);
   CHECK(mean < 1.5);
-  CHECK(drives(3, true, 0.3, {.focal_error = 0.005}).nees > 3.0);  // teeth: an error that all tracks share
+}
+
+TEST_CASE("the covariance knows what the calibration may have wrong for the whole way", "[statistics]") {
+  const SharedDoubt doubt = CameraRig{}.doubt;
+  const auto drawn = [](const SharedDoubt& sizes, const SharedDoubt& told) {
+    return [=](int seed) {
+      std::mt19937 random(static_cast<unsigned>(1000 + seed));
+      std::normal_distribution<double> normal;
+      Calibrated calibrated;
+      calibrated.scale_error = sizes.lengths * normal(random);
+      calibrated.focal_error = sizes.turns * normal(random);
+      calibrated.doubt = told;
+      return calibrated;
+    };
+  };
+  constexpr int kDrives = 10;
+  const auto test = [&](const char* what, const SharedDoubt& sizes, const SharedDoubt& told) {
+    const Drives d = drives_of(kDrives, true, 0.3, drawn(sizes, told));
+    std::printf("calibration drawn, %s: nees %.2f, median error %.3f m, median sigma %.3f m\n", what, d.nees, d.error,
+                d.sigma);
+    return d.nees;
+  };
+  const double nees = test("told", doubt, doubt);
+  CHECK(nees > 0.5);
+  CHECK(nees < 1.7);
+  // Teeth: the same errors where one of the two is not told.
+  CHECK(test("lengths untold", {doubt.lengths, 0.0}, {0.0, doubt.turns}) > 50.0);
+  CHECK(test("turns untold", {0.0, doubt.turns}, {doubt.lengths, 0.0}) > 2.0);
 }
 
 TEST_CASE("a right picture that lies a third of a pixel off is found out by the motion") {
   const double doubt = KeyframeTrackerConfig{}.right_turn_std_deg;
   for (const double shift_px : {-0.3, 0.3}) {
-    const Drives exact = drives(3, true, 0.3), learnt = drives(3, true, 0.3, {0.0, shift_px, doubt}),
-                 believed = drives(3, true, 0.3, {0.0, shift_px, 0.0});
+    const Drives exact = drives(3, true, 0.3),
+                 learnt = drives(3, true, 0.3, {.right_shift_px = shift_px, .right_turn_std_deg = doubt}),
+                 believed = drives(3, true, 0.3, {.right_shift_px = shift_px});
     std::printf("right picture %+.1f px off: error %.3f m, %.3f m where the calibration is believed, %.3f m without\n",
                 shift_px, learnt.error, believed.error, exact.error);
     CHECK(learnt.error < 0.25 * believed.error);  // teeth: the same drive, the calibration believed

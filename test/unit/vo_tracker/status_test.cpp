@@ -47,6 +47,41 @@ TEST_CASE("mono takes its scale from the wheels and says so") {
   }
 }
 
+TEST_CASE("what a calibration may have wrong for the whole way is in the covariance, and is told beside it") {
+  const auto drive = [](double scale_std, double focal_std) {
+    Calibration c = calibration(true);
+    c.sensors.stereo = StereoCalibration{scale_std, focal_std};
+    Collector sink;
+    StageRunner runner(make_vo_tracker(c, threads(1)), sink);
+    for (const Sent& m : pictures()) feed(runner, m);
+    return sink;
+  };
+  const Collector exact = drive(0.0, 0.0), doubted = drive(0.02, 0.01);
+  const auto of = [](const Collector& out) { return out.all<pose_t>("POSE_VO"); };
+  const auto statuses = doubted.all<vo_status_t>("VO_STATUS");
+  REQUIRE(of(exact).size() == of(doubted).size());
+  REQUIRE(statuses.size() == of(doubted).size());
+  const pose_t known = of(exact)[60], told = of(doubted)[60];
+  const vo_status_t& status = statuses[60];
+  REQUIRE(status.utime == told.utime);
+  CHECK(status.scale_std == 0.02);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      double shared = 0.0;
+      for (const auto& row : status.shared_error_m_rad) shared += row[i] * row[j];
+      CHECK(told.cov_pose_m2_rad2[i][j] == Approx(known.cov_pose_m2_rad2[i][j] + shared).margin(1e-12));
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    CHECK(told.position_m[i] == known.position_m[i]);  // considered, not estimated
+    const double way = told.position_m[i] - of(doubted).front().position_m[i];
+    CHECK(status.shared_error_m_rad[0][i] == Approx(0.02 * way).margin(1e-3));
+    CHECK(told.cov_velocity_m2ps2[i][i] ==
+          Approx(known.cov_velocity_m2ps2[i][i] + 4e-4 * told.velocity_mps[i] * told.velocity_mps[i]).margin(1e-12));
+  }
+  CHECK(told.position_m[0] > 5.0);
+}
+
 TEST_CASE("INS speeds that come after the start give a running map its scale") {
   const Collector out = run(with_ins(pictures(), 16, 0.1), false);
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
