@@ -17,9 +17,15 @@ constexpr double kUnknownPosition = 1e-3;  ///< m: a local frame begins where it
 constexpr double kShortestDoubt = 0.1;     ///< s
 constexpr double kLongestStep = 0.1;       ///< s, of the motion models; longer silences go in several
 
+/// Of all elements at once: what is finite is nothing times zero.
+template <class Values>
+bool finite(const Values& values) {
+  return (values.array() * 0.0).sum() == 0.0;
+}
+
 bool usable(const Odometry& o) {
-  return o.T_frame_vehicle.p.allFinite() && std::abs(o.T_frame_vehicle.q.norm() - 1.0) < 1e-3 &&
-         o.velocity.allFinite() && o.angular_rate.allFinite() && o.cov_pose.allFinite() && o.cov_velocity.allFinite() &&
+  return finite(o.T_frame_vehicle.p) && std::abs(o.T_frame_vehicle.q.norm() - 1.0) < 1e-3 && finite(o.velocity) &&
+         finite(o.angular_rate) && finite(o.cov_pose) && finite(o.cov_velocity) &&
          o.cov_pose.diagonal().minCoeff() >= 0.0;
 }
 
@@ -90,25 +96,29 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (!started_ && !good) return done(FuseStatus::kBadQuality);
   if (!started_) start(s);
 
-  const Before before{{planar_estimate(now_), now_.x(kSpeed)}, seconds_between(t_us_, s.odometry.t_us)};
-  advance(s.odometry.t_us);
+  const Before before{now_, seconds_between(t_us_, s.odometry.t_us)};
+  const bool motion_of_ins = s.channel == FusionChannel::kIns && good && memory(s.channel).last;
+  advance(s.odometry.t_us, motion_of_ins);
   if (!good) {
-    combine(imm_, now_);
-    follow_local(before, {planar_estimate(now_), now_.x(kSpeed)});
+    now_ = combine_planar(imm_);
+    follow_local(before, now_);
     memory(s.channel).last.reset();
     if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
     return done(FuseStatus::kBadQuality);
   }
   memory(s.channel).alive_us = report.last_us = t_us_;
-  const double known = combine_planar(imm_).planar.P.topLeftCorner<2, 2>().trace();
+  const double known = place_variance(imm_);
   const LevelView view = level_view(s.odometry);
   const FuseStatus status = fuse(s, view, before, report);
-  if (s.channel == FusionChannel::kVo) update_tie(s);
+  if (s.channel == FusionChannel::kVo) {
+    now_ = combine_planar(imm_);
+    update_tie(s);
+  }
   remember(s, view);
   reweigh(imm_);
-  combine(imm_, now_);
+  now_ = combine_planar(imm_);
   report.status = status;
-  weigh(s.channel, std::max(0.0, known / now_.P.block<2, 2>(kPos, kPos).trace() - 1.0));
+  weigh(s.channel, std::max(0.0, known / now_.planar.P.topLeftCorner<2, 2>().trace() - 1.0));
   return status;
 }
 
@@ -122,13 +132,11 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
     place(s.odometry);
     return FuseStatus::kAccepted;
   }
-  if (s.channel == FusionChannel::kVo) combine(imm_, now_);  // for its gate
   move_height(s);
   const FuseStatus status = fuse_motion(s, view, report);
   fuse_rates(s, view, !ins && status == FuseStatus::kAccepted);
   const PlanarMixture after = combine_planar(imm_);
   follow_local(before, after);
-  if (s.channel == FusionChannel::kVo) combine(imm_, now_);  // for the tie
   return ins ? fuse_gain(s, view, after.planar, report) : status;
 }
 
@@ -159,7 +167,7 @@ void Fusion::start(const ChannelSample& s) {
   set_independent(e, kInsDrift, 0.0, ins_drift_std_);
   for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
   for (Mode& mode : imm_.modes) mode.estimate = e;
-  now_ = e;
+  now_ = combine_planar(imm_);
   started_ = true;
   placed_ = enu;
   foreign_ = !enu;
@@ -169,6 +177,7 @@ void Fusion::start(const ChannelSample& s) {
 void Fusion::place(const Odometry& o) {
   for (Mode& mode : imm_.modes) {
     FusionEstimate& e = mode.estimate;
+    set_cloned(e, true);
     for (int i = 0; i < 3; ++i) set_independent(e, kPos + i, planar_pose(o)(i), 1.0);
     e.P.block<3, 3>(kPos, kPos) = planar_covariance(o);
     for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
@@ -176,25 +185,31 @@ void Fusion::place(const Odometry& o) {
   for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) memory(c).last.reset();
   height_ = o.T_frame_vehicle.p.z();
   height_variance_ = o.cov_pose(2, 2);
-  combine(imm_, now_);
   tie_.forget();
   placed_ = true;
   foreign_ = false;
 }
 
-/// Mixing and prediction to t_us, in steps that the models are good for.
-void Fusion::advance(int64_t t_us) {
+/// Mixing and prediction to t_us, in steps that the models are good for. Where the INS's motion comes next, its clone
+/// may be the pose that the one step began at; otherwise it needs rows of its own.
+void Fusion::advance(int64_t t_us, bool motion_of_ins) {
   const double total = seconds_between(t_us_, t_us);
   if (total <= 0.0) {
-    for (Mode& mode : imm_.modes) mode.log_likelihood = 0.0;
+    for (Mode& mode : imm_.modes) {
+      set_cloned(mode.estimate, true);
+      mode.log_likelihood = 0.0;
+    }
     return;
   }
   const int steps = std::min(100, 1 + static_cast<int>(total / kLongestStep));
   const double dt = total / steps;
+  if (!motion_of_ins || steps > 1)
+    for (Mode& mode : imm_.modes) set_cloned(mode.estimate, true);
+  const bool cloned = imm_.modes[0].estimate.cloned;
   const Eigen::Matrix2d transition = mode_transition(dt, {config_.straight_duration, config_.turn_duration});
   for (int i = 0; i < steps; ++i) {
     mix(imm_, transition);
-    predict(imm_, config_.motion, dt);
+    predict(imm_, config_.motion, dt, cloned ? nullptr : &begun_);
   }
   let_return(comeback_, config_.comeback, total);
   doubt_ *= std::exp(-total / std::max(kShortestDoubt, config_.refusal_timeout));

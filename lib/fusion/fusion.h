@@ -109,7 +109,7 @@ class Fusion {
     return reports_[static_cast<std::size_t>(c)];
   }
   [[nodiscard]] const Imm& imm() const { return imm_; }
-  [[nodiscard]] const FusionEstimate& estimate() const { return now_; }
+  [[nodiscard]] FusionEstimate estimate() const { return combine(imm_); }
   [[nodiscard]] const FrameTie& tie() const { return tie_; }
   [[nodiscard]] bool tie_frozen() const { return !gnss_; }
   /// Vision disagrees, or is lost, and should start again; until take_restart().
@@ -166,7 +166,7 @@ class Fusion {
 
   void start(const ChannelSample& sample);
   void place(const Odometry& o);
-  void advance(int64_t t_us);
+  void advance(int64_t t_us, bool motion_of_ins);
   FuseStatus fuse(const ChannelSample& sample, const LevelView& view, const Before& before,
                   FusionChannelReport& report);
   FuseStatus fuse_literal(const ChannelSample& sample, FusionChannelReport& report);
@@ -219,7 +219,8 @@ class Fusion {
   bool placed_ = false;  ///< the planar state is in enu
   int64_t t_us_ = 0;
   Imm imm_;
-  FusionEstimate now_;  ///< combined
+  PlanarMixture now_;  ///< of imm_
+  PosesBefore begun_;  ///< where the modes began this step, while the INS's clone is the pose itself
   std::array<Memory, kFusionChannels> memories_;
   std::array<FusionChannelReport, kFusionChannels> reports_;
   std::array<double, kFusionChannels> information_{};

@@ -54,14 +54,8 @@ bool Fusion::follows(const Ahead& a) const {
 
 /// (F.14), (F.15): the channel's motion less what is known of its errors, and its own noise.
 Fusion::Forward Fusion::forward(const Ahead& a) const {
-  const Vector& x = now_.x;
   Forward f;
-  f.planar = planar_estimate(now_);
-  f.speed = x(kSpeed);
-  f.speed_variance = now_.P(kSpeed, kSpeed);
-  f.turn = x(kTurn);
-  if (a.dt <= 0.0) return f;
-  if (follows(a)) {
+  if (a.dt > 0.0 && follows(a)) {
     f.planar = {a.view.pose, a.view.P};
     f.way = a.way;
     f.speed = a.felt->velocity.x();
@@ -69,6 +63,13 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
     f.turn = a.view.turn;
     return f;
   }
+  const FusionEstimate now = combine(imm_);
+  const Vector& x = now.x;
+  f.planar = planar_estimate(now);
+  f.speed = x(kSpeed);
+  f.speed_variance = now.P(kSpeed, kSpeed);
+  f.turn = x(kTurn);
+  if (a.dt <= 0.0) return f;
   const ChannelSlots s = slots(a.channel);
   const bool told = a.felt != nullptr && (a.metric || !vo_scale_open_);
   const double silent = told ? a.silent : a.dt, heard = a.dt - silent;
@@ -104,7 +105,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   f.planar.pose = after_motion(start, way);
   f.way = way;
   if (s.velocity) f.planar.pose.head<2>() -= heard * x.segment<2>(*s.velocity);
-  const Eigen::Matrix4d P = F.lazyProduct(now_.P).eval().lazyProduct(F.transpose());
+  const Eigen::Matrix4d P = F.lazyProduct(now.P).eval().lazyProduct(F.transpose());
   const MotionFloor& least = floor(a.channel);
   const double sigma = least.position * std::sqrt(a.dt) + least.share * way.head<2>().norm();
   f.planar.P = P.topLeftCorner<3, 3>();
@@ -145,7 +146,7 @@ Fusion::Poses Fusion::carried(const Ahead& a) const {
 
   PlanarEstimate l = local_;
   if (a.dt > 0.0) {
-    l = moved_along(local_, planar_estimate(now_), f.way, f.planar.P);
+    l = moved_along(local_, now_.planar, f.way, f.planar.P);
   }
   out.local = out.fused;
   const Odometry placed =

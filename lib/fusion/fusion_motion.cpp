@@ -34,7 +34,8 @@ Planar Fusion::motion_of(FusionChannel channel, const LevelView& last, const Lev
 /// A vision without scale takes the first one from what the others say of the same motion.
 bool Fusion::scale_is_open(const ChannelSample& s, const Planar& motion) {
   if (s.metric || !vo_scale_open_ || s.channel != FusionChannel::kVo) return false;
-  const double length = motion_between(now_.x.segment<3>(kVoClone), now_.x.segment<3>(kPos)).head<2>().norm();
+  const FusionEstimate now = combine(imm_);
+  const double length = motion_between(now.x.segment<3>(kVoClone), now.x.segment<3>(kPos)).head<2>().norm();
   const double measured = motion.head<2>().norm();
   if (length < kScaleBase || !(measured > 0.0)) return true;
   for (Mode& mode : imm_.modes) set_independent(mode.estimate, kVoScale, std::log(measured / length), kFirstScaleSigma);
@@ -64,18 +65,16 @@ void Fusion::follow_ins_errors(const Odometry& ins, double dt, bool was_away) {
   const Eigen::Vector2d grown = grown_velocity_variance(P);
   const double drift_grown = std::max(0.0, drift_variance - m.drift_variance);
   distrust_ *= std::exp(-dt / kDistrustTime);
-  for (Mode& mode : imm_.modes) {
-    FusionEstimate& e = mode.estimate;
-    for (int i = 0; i < 2; ++i) {
-      if (redone)
-        set_independent(e, kInsVelocity + i, 0.0, std::max(distrust_, std::sqrt(P(i, i))));
-      else
-        e.P(kInsVelocity + i, kInsVelocity + i) += grown(i);
-    }
-    if (redone)
-      set_independent(e, kInsDrift, 0.0, ins_drift_std_);
-    else
+  for (std::size_t k = 0; k < kModes; ++k) {
+    FusionEstimate& e = imm_.modes[k].estimate;
+    if (!redone) {
+      for (int i = 0; i < 2; ++i) e.P(kInsVelocity + i, kInsVelocity + i) += grown(i);
       e.P(kInsDrift, kInsDrift) += drift_grown;
+      continue;
+    }
+    for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::max(distrust_, std::sqrt(P(i, i))));
+    set_independent(e, kInsDrift, 0.0, ins_drift_std_);
+    begun_[k].with.middleRows<3>(kInsVelocity).setZero();
   }
   if (redone) {
     m.velocity_covariance = P;
@@ -132,7 +131,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
   Eigen::Matrix3d R = motion_noise(m, s, view, motion, dt);
   const int drift = ins ? kInsDrift : kVoDrift;
   m.yaw_rate_variance = R(2, 2) / dt;
-  if (s.channel != FusionChannel::kWheel) m.yaw_rate_variance += kYawTime * now_.P(drift, drift);
+  if (s.channel != FusionChannel::kWheel) m.yaw_rate_variance += kYawTime * combined_variance(imm_, drift);
   if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
     R.row(2).setZero();
     R.col(2).setZero();
@@ -149,7 +148,8 @@ FuseStatus Fusion::carry_by_ins(const Planar& motion, double dt, const Eigen::Ma
   Mean<3> mean;
   for (std::size_t i = 0; i < kModes; ++i) {
     Mode& mode = imm_.modes[i];
-    const CarriedOn told = carry_on(mode.estimate, slots(FusionChannel::kIns), motion, dt, R, with_yaw);
+    const CarriedOn told = mode.estimate.cloned ? carry_on(mode.estimate, motion, dt, R, with_yaw)
+                                                : carry_on(mode.estimate, begun_[i], motion, dt, R, with_yaw);
     mode.log_likelihood += told.innovation.log_likelihood;
     add(mean, imm_.probability(static_cast<Eigen::Index>(i)), told.innovation, told.difference);
   }
@@ -164,12 +164,13 @@ FuseStatus Fusion::fuse_odometry(FusionChannel channel, const Planar& motion, do
   Memory& m = memory(channel);
   const ChannelSlots where = slots(channel);
   const Eigen::Matrix3d white = jitter(channel);
+  const FusionEstimate now = combine(imm_);
   Eigen::Matrix3d measured = R + white;
   if (where.scale)
-    measured.topLeftCorner<2, 2>() += std::expm1(2.0 * now_.x(*where.scale)) * white.topLeftCorner<2, 2>();
+    measured.topLeftCorner<2, 2>() += std::expm1(2.0 * now.x(*where.scale)) * white.topLeftCorner<2, 2>();
   if (channel == FusionChannel::kVo) {
-    const FusionMeasurement<3> at = relative_motion(now_.x, where, motion, dt, measured);
-    tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
+    const FusionMeasurement<3> at = relative_motion(now.x, where, motion, dt, measured);
+    tell(judge<3>(now, at.H, at.innovation, at.R), at.innovation, report);
     compare(agreement_, config_.agreement, report.nis);
     if (!agreement_.agrees) ask_restart("vision disagrees with wheels and imu");
     const bool outlier = report.nis > config_.gate;

@@ -68,7 +68,7 @@ FusionReport Fusion::report() const {
   const bool ins = alive(FusionChannel::kIns);
   const bool vision = vision_speaks();
   const bool wheel = alive(FusionChannel::kWheel);
-  const double sigma = std::sqrt(now_.P.block<2, 2>(kPos, kPos).trace());
+  const double sigma = std::sqrt(now_.planar.P.topLeftCorner<2, 2>().trace());
   r.phase = FusionPhase::kRunning;
   r.validity = Validity::kValid;
   r.local_validity = ins || vision || wheel ? Validity::kValid : Validity::kCoasting;
@@ -100,7 +100,7 @@ FusionReport Fusion::report() const {
 
 template <class Self, class Visitor>
 void Fusion::visit_members(Self& self, const Visitor& visit) {
-  visit(self.started_, self.placed_, self.t_us_, self.imm_.probability, self.now_);
+  visit(self.started_, self.placed_, self.t_us_, self.imm_.probability);
   for (auto& mode : self.imm_.modes) visit(mode.estimate, mode.log_likelihood);
   for (auto& r : self.reports_)
     visit(r.status, r.weight, r.alpha, r.nis, r.dof, r.innovation, r.innovation_variance, r.gate, r.last_us);
@@ -140,6 +140,7 @@ void Fusion::load(StateReader& reader) {
     m.view = level_view(*m.last);
   }
   get(restart_reason_);
+  now_ = combine_planar(imm_);
 }
 
 }  // namespace roadfix

@@ -17,22 +17,21 @@ constexpr double kTieFloor = 0.02;   ///< m and rad / 10, of one comparison
 /// begins again at once, in an outage as well: as sure as the fused pose is, it can tell the vision where to restart.
 void Fusion::update_tie(const ChannelSample& s) {
   const SE3& T_vo_vehicle = s.odometry.T_frame_vehicle;
-  Odometry here = fused();
   Eigen::Matrix4d cov = Eigen::Matrix4d::Zero();
-  cov.topLeftCorner<2, 2>() = now_.P.block<2, 2>(kPos, kPos);
+  cov.topLeftCorner<2, 2>() = now_.planar.P.topLeftCorner<2, 2>();
   cov(2, 2) = height_variance_;
-  cov(3, 3) = now_.P(kYaw, kYaw) + 0.01 * kTieFloor * kTieFloor;
+  cov(3, 3) = now_.planar.P(2, 2) + 0.01 * kTieFloor * kTieFloor;
   cov.diagonal().head<3>().array() += kTieFloor * kTieFloor;
   const bool known = placed_ && gnss_ && agreement_.agrees;
   if (!tie_.valid()) {
     if (!placed_) return;
-    tie_.start(T_vo_vehicle, here.T_frame_vehicle, cov, config_.tie);
+    tie_.start(T_vo_vehicle, fused().T_frame_vehicle, cov, config_.tie);
     last_tie_us_ = t_us_;
     return;
   }
   tie_.move_to(T_vo_vehicle, config_.tie);
   if (!known || seconds_between(*last_tie_us_, t_us_) < kTieSpacing) return;
-  tie_.correct(T_vo_vehicle, here.T_frame_vehicle, cov);
+  tie_.correct(T_vo_vehicle, fused().T_frame_vehicle, cov);
   last_tie_us_ = t_us_;
 }
 

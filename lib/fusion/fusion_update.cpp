@@ -32,17 +32,23 @@ void Fusion::fuse_rates(const ChannelSample& s, const LevelView& view, bool told
   if (told) return;
   if (s.channel != FusionChannel::kIns && alive(FusionChannel::kIns)) return;
   if (s.channel == FusionChannel::kVo && !agreement_.agrees) return;
-  std::array<double, kModes> likely{};
-  for (std::size_t i = 0; i < kModes; ++i) likely[i] = imm_.modes[i].log_likelihood;
-  update<1>([&](const Vector& x) { return absolute_component(x, kTurn, view.turn, config_.turn_sigma); });
-  if (s.channel == FusionChannel::kIns && memory(s.channel).last) {  // the motion has told the turn already
-    for (std::size_t i = 0; i < kModes; ++i) imm_.modes[i].log_likelihood = likely[i];
-  }
-  if (!s.metric) return;
+  // The motion of an INS has told the turn already: its likelihood would count twice.
+  const bool turn_is_new = s.channel != FusionChannel::kIns || !memory(s.channel).last;
   const double lasting = s.channel == FusionChannel::kIns ? 0.0 : s.odometry.cov_velocity(0, 0);
   const double variance = lasting + config_.speed_sigma * config_.speed_sigma;
   const ChannelSlots where = slots(s.channel);
-  update<1>([&](const Vector& x) { return channel_speed(x, where, s.odometry.velocity.x(), variance); });
+  for (Mode& mode : imm_.modes) {
+    FusionEstimate& e = mode.estimate;
+    const ScalarUpdate turn = begin_update(e, told_turn(e.x, view.turn, config_.turn_sigma));
+    if (turn_is_new) mode.log_likelihood += turn.log_likelihood();
+    if (!s.metric) {
+      finish_update(e, turn);
+      continue;
+    }
+    const ScalarUpdate speed = begin_update(e, told_speed(e.x, where, s.odometry.velocity.x(), variance), &turn);
+    mode.log_likelihood += speed.log_likelihood();
+    finish_update(e, turn, speed);
+  }
 }
 
 bool Fusion::vision_speaks() const {
@@ -56,14 +62,14 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
   std::optional<FusionMeasurement<3>> gain = gained_pose(known, view.pose, view.P, config_.least_gain);
   if (!gain) return FuseStatus::kAccepted;  // nothing that is not known already
 
-  combine(imm_, now_);
-  const FusionMeasurement<3> plain = absolute_pose(now_.x, view.pose, view.P);
-  tell(judge<3>(now_, plain.H, plain.innovation, plain.R), plain.innovation, report);
+  const FusionEstimate now = combine(imm_);
+  const FusionMeasurement<3> plain = absolute_pose(now.x, view.pose, view.P);
+  tell(judge<3>(now, plain.H, plain.innovation, plain.R), plain.innovation, report);
   FuseStatus status = FuseStatus::kAccepted;
   if (report.nis > config_.gate && !vision_speaks()) {
     // All that it contradicts came from the INS itself, which knows it, and has judged the fix.
     give_way(plain.innovation);
-    gain = gained_pose(planar_estimate(now_), view.pose, view.P, config_.least_gain);
+    gain = gained_pose(combine_planar(imm_).planar, view.pose, view.P, config_.least_gain);
     status = FuseStatus::kReset;
   } else if (report.nis > config_.gate) {
     refuse_fix(comeback_);
@@ -72,7 +78,7 @@ FuseStatus Fusion::fuse_gain(const ChannelSample& s, const LevelView& view, cons
     if (!refused_since_us_) refused_since_us_ = t_us_;
     if (seconds_between(*refused_since_us_, t_us_) < config_.refusal_timeout) return FuseStatus::kGated;
     give_way(plain.innovation);
-    gain = gained_pose(planar_estimate(now_), view.pose, view.P, config_.least_gain);
+    gain = gained_pose(combine_planar(imm_).planar, view.pose, view.P, config_.least_gain);
     status = FuseStatus::kReset;
     passes_needed_ = 0;
   }
@@ -107,16 +113,15 @@ FuseStatus Fusion::follow_ins(const PlanarEstimate& known, const LevelView& view
 }
 
 void Fusion::apply_gain(const FusionMeasurement<3>& gain) {
-  const FusionEstimate before = now_;
+  const FusionEstimate before = combine(imm_);
   update<3>([&](const Vector& x) {
     FusionMeasurement<3> m = gain;
     m.innovation += gain.H * difference(before.x, x);
     return m;
   });
-  combine(imm_, now_);
   // Taken over in every direction: nothing is left that the INS does not know.
   foreign_ = gain.R.diagonal().maxCoeff() >= kUninformative;
-  count_fix(difference(now_.x, before.x).segment<3>(kPos));
+  count_fix(difference_of(combine_planar(imm_).planar.pose, before.x.segment<3>(kPos)));
 }
 
 /// A correction of the filter's own pose; by a fix where the INS used one.
@@ -148,12 +153,11 @@ void Fusion::give_way(const Planar& difference) {
   for (Mode& mode : imm_.modes)
     for (const int i : kTogether)
       for (const int j : kTogether) mode.estimate.P.block<3, 3>(i, j) += all;
-  combine(imm_, now_);
   if (vision_speaks()) doubt_ = difference;
 }
 
 FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& report) {
-  combine(imm_, now_);
+  const FusionEstimate now = combine(imm_);
   Memory& m = memory(s.channel);
   const AdaptiveConfig& c = config_.adaptive;
   Odometry o = s.odometry;
@@ -172,8 +176,8 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& rep
   const LevelView view = level_view(o);
   const Eigen::Matrix3d R = scaled_and_clipped(view.P, report.alpha, c);
   const Planar pose = view.pose;
-  const FusionMeasurement<3> at = absolute_pose(now_.x, pose, R);
-  tell(judge<3>(now_, at.H, at.innovation, at.R), at.innovation, report);
+  const FusionMeasurement<3> at = absolute_pose(now.x, pose, R);
+  tell(judge<3>(now, at.H, at.innovation, at.R), at.innovation, report);
   report.gate = c.gate;
   add_nis(m.check, c, report.nis, 3);
   if (report.nis > c.gate) return FuseStatus::kGated;
@@ -183,7 +187,6 @@ FuseStatus Fusion::fuse_literal(const ChannelSample& s, FusionChannelReport& rep
     update<1>([&](const Vector& x) {
       return absolute_component(x, kSpeed, o.velocity.x(), std::sqrt(o.cov_velocity(0, 0)) + 1e-3);
     });
-  combine(imm_, now_);
   return FuseStatus::kAccepted;
 }
 
@@ -195,10 +198,14 @@ void Fusion::remember(const ChannelSample& s, const LevelView& view) {
   m.view = view;
   if (s.channel == FusionChannel::kIns) memory(FusionChannel::kWheel).last.reset();  // it has their clone
   if (m.carried) return;
+  if (s.channel == FusionChannel::kIns) {  // its clone is the pose
+    for (Mode& mode : imm_.modes) set_cloned(mode.estimate, false);
+    return;
+  }
   const int clone = slots(s.channel).clone;
   for (Mode& mode : imm_.modes) {
     clone_pose(mode.estimate, clone);
-    if (s.channel != FusionChannel::kIns) mode.estimate.P.block<3, 3>(clone, clone) += jitter(s.channel);
+    mode.estimate.P.block<3, 3>(clone, clone) += jitter(s.channel);
   }
 }
 

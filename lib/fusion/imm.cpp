@@ -35,19 +35,29 @@ void mix(Imm& imm, const Eigen::Matrix2d& transition) {
   };
   const double w_a = from_b(0), w_b = from_b(1);
   // Differences are taken from the first mode, so that equal modes keep their bits.
-  for (int j = 0; j < kStates; ++j) {
-    const Vector first = a.P.col(j), apart = b.P.col(j) - first;
-    a.P.col(j) = first + w_a * apart + (spread(w_a) * d(j)) * d;
-    b.P.col(j) = first + w_b * apart + (spread(w_b) * d(j)) * d;
-  }
+  with_size(a, [&](auto rows, auto columns) {
+    const Register* apart_x = registers(d.data());
+    for (int j = 0; j < columns; ++j) {
+      Register *in_a = column(a.P, j), *in_b = column(b.P, j);
+      const double of_a = spread(w_a) * d(j), of_b = spread(w_b) * d(j);
+      each_register<rows>([&](int i) {
+        const Register first = in_a[i], apart = in_b[i] - first;
+        in_a[i] = first + w_a * apart + of_a * apart_x[i];
+        in_b[i] = first + w_b * apart + of_b * apart_x[i];
+      });
+    }
+  });
   b.x = plus(a.x, w_b * d);
   a.x = plus(a.x, w_a * d);
   for (Mode& mode : imm.modes) mode.log_likelihood = 0.0;
   imm.probability = predicted;
 }
 
-void predict(Imm& imm, const MotionNoise& noise, double dt) {
-  for (Mode& mode : imm.modes) move(mode.estimate, mode.kind, noise, dt);
+void predict(Imm& imm, const MotionNoise& noise, double dt, PosesBefore* before) {
+  for (std::size_t i = 0; i < kModes; ++i) {
+    Mode& mode = imm.modes[i];
+    move(mode.estimate, mode.kind, noise, dt, before != nullptr ? &(*before)[i] : nullptr);
+  }
 }
 
 void reweigh(Imm& imm) {
@@ -65,8 +75,17 @@ void combine(const Imm& imm, FusionEstimate& m) {
   const FusionEstimate& b = imm.modes[1].estimate;
   const Vector d = difference(b.x, a.x);
   const double w = imm.probability(1);
+  set_cloned(m, a.cloned);
   m.x = plus(a.x, w * d);
-  for (int j = 0; j < kStates; ++j) m.P.col(j) = a.P.col(j) + w * (b.P.col(j) - a.P.col(j)) + (spread(w) * d(j)) * d;
+  with_size(a, [&](auto rows, auto columns) {
+    const Register* apart_x = registers(d.data());
+    for (int j = 0; j < columns; ++j) {
+      const Register *in_a = column(a.P, j), *in_b = column(b.P, j);
+      Register* out = column(m.P, j);
+      const double of_x = spread(w) * d(j);
+      each_register<rows>([&](int i) { out[i] = in_a[i] + w * (in_b[i] - in_a[i]) + of_x * apart_x[i]; });
+    }
+  });
 }
 
 PlanarMixture combine_planar(const Imm& imm) {
@@ -81,6 +100,16 @@ PlanarMixture combine_planar(const Imm& imm) {
   m.planar.P = P_a + w * (P_b - P_a) + spread(w) * (d * d.transpose());
   m.speed = a.x(kSpeed) + w * (b.x(kSpeed) - a.x(kSpeed));
   return m;
+}
+
+double place_variance(const Imm& imm) { return combined_variance(imm, kPos) + combined_variance(imm, kPos + 1); }
+
+double combined_variance(const Imm& imm, int i) {
+  const FusionEstimate& a = imm.modes[0].estimate;
+  const FusionEstimate& b = imm.modes[1].estimate;
+  const double w = imm.probability(1);
+  const double d = b.x(i) - a.x(i);
+  return a.P(i, i) + w * (b.P(i, i) - a.P(i, i)) + spread(w) * (d * d);
 }
 
 }  // namespace roadfix

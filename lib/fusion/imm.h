@@ -34,8 +34,9 @@ Eigen::Matrix2d mode_transition(double dt, const Eigen::Vector2d& mean_duration)
 /// predicted. Log-likelihoods are zeroed.
 void mix(Imm& imm, const Eigen::Matrix2d& transition);
 
-/// Each mode by its own model.
-void predict(Imm& imm, const MotionNoise& noise, double dt);
+/// Each mode by its own model. `before`: the poses that they moved from.
+using PosesBefore = std::array<PoseBefore, kModes>;
+void predict(Imm& imm, const MotionNoise& noise, double dt, PosesBefore* before = nullptr);
 
 /// Probabilities by the likelihoods: log-sum-exp, so that they sum to one for likelihoods as small as they come.
 void reweigh(Imm& imm);
@@ -54,5 +55,9 @@ struct PlanarMixture {
   double speed = 0.0;  ///< m/s
 };
 PlanarMixture combine_planar(const Imm& imm);
+/// m2, east and north together.
+double place_variance(const Imm& imm);
+/// Of one state.
+double combined_variance(const Imm& imm, int index);
 
 }  // namespace roadfix

@@ -49,18 +49,23 @@ FusionMeasurement<1> absolute_component(const Vector& x, int index, double value
   return m;
 }
 
-FusionMeasurement<1> channel_speed(const Vector& x, const ChannelSlots& slots, double speed, double variance) {
+ScalarMeasurement told_turn(const Vector& x, double turn, double sigma) {
+  return {{kTurn}, {1.0}, 1, turn - x(kTurn), sigma * sigma};
+}
+
+ScalarMeasurement told_speed(const Vector& x, const ChannelSlots& slots, double speed, double variance) {
   const double length = length_factor(x, slots);
-  FusionMeasurement<1> m;
-  m.H(0, kSpeed) = length;
-  m.innovation(0) = speed - length * x(kSpeed);
-  if (slots.scale) m.H(0, *slots.scale) = length * x(kSpeed);
+  ScalarMeasurement m{{kSpeed}, {length}, 1, speed - length * x(kSpeed), variance};
+  const auto also = [&](int index, double h) {
+    m.index[static_cast<std::size_t>(m.count)] = index;
+    m.h[static_cast<std::size_t>(m.count++)] = h;
+  };
+  if (slots.scale) also(*slots.scale, length * x(kSpeed));
   if (slots.velocity) {
     const Eigen::RowVector2d along(std::cos(x(kYaw)), std::sin(x(kYaw)));
-    m.H.block<1, 2>(0, *slots.velocity) = along;
-    m.innovation(0) -= along.dot(x.segment<2>(*slots.velocity));
+    for (int i = 0; i < 2; ++i) also(*slots.velocity + i, along(i));
+    m.innovation -= along.dot(x.segment<2>(*slots.velocity));
   }
-  m.R(0, 0) = variance;
   return m;
 }
 
@@ -88,47 +93,58 @@ FusionMeasurement<3> relative_motion(const Vector& x, const ChannelSlots& slots,
   return m;
 }
 
-CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
+CarriedOn carry_on(FusionEstimate& e, const Planar& motion, double dt, const Eigen::Matrix3d& R, bool with_yaw) {
+  const Planar clone = e.x.segment<3>(kInsClone);
+  return carry_on(e,
+                  {clone,
+                   {std::cos(clone.z()), std::sin(clone.z())},
+                   e.P.block<3, 3>(kInsClone, kInsClone),
+                   e.P.middleCols<3>(kInsClone)},
+                  motion, dt, R, with_yaw);
+}
+
+CarriedOn carry_on(FusionEstimate& e, const PoseBefore& start, const Planar& motion, double dt,
                    const Eigen::Matrix3d& R, bool with_yaw) {
-  const int n = with_yaw ? 3 : 2;
-  const Planar clone = e.x.segment<3>(slots.clone);
-  const MovedPlanar moved = moved_by(clone, motion);
-  const Eigen::Matrix3d& A = moved.by_start;
-  Planar next = moved.pose;
-  // cov(x, next), by columns: rows of three do not fill a register.
-  const Eigen::Matrix<double, kSize, 3> with_clone = e.P.middleRows<3>(slots.clone).transpose();
-  Eigen::Matrix<double, kSize, 3> with = with_clone.lazyProduct(A.transpose());
-  if (slots.velocity) {
-    next.head<2>() -= dt * e.x.segment<2>(*slots.velocity);
-    with.leftCols<2>() -= dt * e.P.middleRows<2>(*slots.velocity).transpose();
-  }
-  if (slots.drift) {
-    next.z() = wrap_angle(next.z() - dt * e.x(*slots.drift));
-    with.col(2) -= dt * e.P.row(*slots.drift).transpose();
-  }
-  Eigen::Matrix3d P = with.middleRows<3>(slots.clone).transpose();
-  P *= A.transpose();
-  if (slots.velocity) P.leftCols<2>() -= dt * with.middleRows<2>(*slots.velocity).transpose();
-  if (slots.drift) P.col(2) -= dt * with.row(*slots.drift).transpose();
-  P += moved.by_motion * R * moved.by_motion.transpose();
+  const double c = start.heading.x(), s = start.heading.y();
+  const double way_e = c * motion.x() - s * motion.y(), way_n = s * motion.x() + c * motion.y();
+  const Planar next(start.pose.x() + way_e - dt * e.x(kInsVelocity),
+                    start.pose.y() + way_n - dt * e.x(kInsVelocity + 1),
+                    wrap_angle(wrap_angle(start.pose.z() + motion.z()) - dt * e.x(kInsDrift)));
+  // next = start + way, turned by the start's yaw, less dt times what errs in each component.
+  const double by_yaw[] = {-way_n, way_e, 0.0};
+  constexpr int kErrs[] = {kInsVelocity, kInsVelocity + 1, kInsDrift};
   CarriedOn told;
-  told.difference = difference_of(next, e.x.segment<3>(kPos));
-  const Eigen::Matrix3d with_predicted = with.middleRows<3>(kPos).transpose();
-  Eigen::Matrix3d S = e.P.block<3, 3>(kPos, kPos) + P - with_predicted - with_predicted.transpose();
-  S = 0.5 * (S + S.transpose()).eval();
-  told.innovation = likelihood(told.difference, S);
-  for (int i = 0; i < n; ++i) {
-    e.x(kPos + i) = next(i);
-    e.P.row(kPos + i) = with.col(i).transpose();
-    e.P.col(kPos + i) = with.col(i);
-  }
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) e.P(kPos + i, kPos + j) = 0.5 * (P(i, j) + P(j, i));
-  if (!with_yaw) {  // the yaw that stays is correlated with the clone's
-    const Eigen::RowVector2d with_yaw_kept = with.block<1, 2>(kYaw, 0);
-    e.P.block<1, 2>(kYaw, kPos) = with_yaw_kept;
-    e.P.block<2, 1>(kPos, kYaw) = with_yaw_kept.transpose();
-  }
+  with_size(e, [&](auto length, auto columns) {
+    Eigen::Matrix<double, kSize, 3> with;  // cov(x, next)
+    Eigen::Matrix3d own, P;                // cov(start, next), cov(next, next)
+    for (int k = 0; k < 3; ++k) {
+      const Register *from = registers(start.with.col(k).data()), *yaw = registers(start.with.col(2).data());
+      const Register* errs = column(e.P, kErrs[k]);
+      Register* out = registers(with.col(k).data());
+      each_register<length>([&](int i) { out[i] = (from[i] + by_yaw[k] * yaw[i]) - dt * errs[i]; });
+      for (int i = 0; i < 3; ++i) own(i, k) = start.P(i, k) + by_yaw[k] * start.P(i, 2) - dt * start.with(kErrs[k], i);
+    }
+    const Eigen::Matrix3d noise = turned(R, c, s);
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 3; ++i) P(i, k) = own(i, k) + by_yaw[i] * own(2, k) - dt * with(kErrs[i], k) + noise(i, k);
+
+    told.difference = difference_of(next, e.x.segment<3>(kPos));
+    Eigen::Matrix3d S;
+    for (int k = 0; k < 3; ++k)
+      for (int i = k; i < 3; ++i) S(i, k) = S(k, i) = e.P(i, k) + P(i, k) - with(i, k) - with(k, i);
+    told.innovation = likelihood(told.difference, S);
+
+    const int n = with_yaw ? 3 : 2;
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < n; ++k) with(kPos + i, k) = 0.5 * (P(i, k) + P(k, i));
+    for (int i = 0; i < n; ++i) {
+      e.x(kPos + i) = next(i);
+      const Register* from = registers(with.col(i).data());
+      Register* to = column(e.P, kPos + i);
+      each_register<length>([&](int k) { to[k] = from[k]; });
+      for (int k = kPos + n; k < columns; ++k) e.P(kPos + i, k) = with(k, i);
+    }
+  });
   return told;
 }
 

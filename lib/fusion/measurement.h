@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "fusion/fusion_state.h"
+#include "fusion/motion_model.h"
 #include "fusion/planar.h"
 
 namespace roadfix {
@@ -37,8 +37,10 @@ FusionMeasurement<3> absolute_pose(const fusion::Vector& x, const Planar& pose, 
 /// Paper C (5), (6) of one component.
 FusionMeasurement<1> absolute_component(const fusion::Vector& x, int index, double value, double sigma);
 
+/// A yaw rate, with its standard deviation.
+ScalarMeasurement told_turn(const fusion::Vector& x, double turn, double sigma);
 /// The channel's speed along the vehicle's x: with its scale, as its ways, or with its velocity error.
-FusionMeasurement<1> channel_speed(const fusion::Vector& x, const ChannelSlots& slots, double speed, double variance);
+ScalarMeasurement told_speed(const fusion::Vector& x, const ChannelSlots& slots, double speed, double variance);
 
 /// Motion that the state predicts since the clone, as the channel would measure it over dt (F.10).
 Planar predicted_motion(const fusion::Vector& x, const ChannelSlots& slots, double dt);
@@ -47,14 +49,16 @@ Planar predicted_motion(const fusion::Vector& x, const ChannelSlots& slots, doub
 FusionMeasurement<3> relative_motion(const fusion::Vector& x, const ChannelSlots& slots, const Planar& motion,
                                      double dt, const Eigen::Matrix3d& R);
 
-/// The state after a channel's motion since its clone, of which no motion model knows as much: the place (and the yaw,
+/// The state after the INS's motion since its clone, of which no motion model knows as much: the place (and the yaw,
 /// if `with_yaw`) is the clone's, carried on (F.11b). R in the axes of the clone. What the model had predicted is told
 /// apart: for its likelihood.
 struct CarriedOn {
   FusionInnovation<3> innovation;                        ///< of the model's prediction
   Eigen::Vector3d difference = Eigen::Vector3d::Zero();  ///< carried less predicted
 };
-CarriedOn carry_on(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
+CarriedOn carry_on(FusionEstimate& e, const Planar& motion, double dt, const Eigen::Matrix3d& R, bool with_yaw);
+/// The same where the clone is the pose that the last move began at.
+CarriedOn carry_on(FusionEstimate& e, const PoseBefore& start, const Planar& motion, double dt,
                    const Eigen::Matrix3d& R, bool with_yaw);
 
 /// The channel's own pose beside the fused one, carried on by its motion (F.11c); R as the channel measures.

@@ -20,14 +20,14 @@ struct Arc {
 Arc arc(double yaw, double turned, double distance) {
   const double h = 0.5 * turned;
   const bool small = std::abs(h) < 1e-4;
-  const double ratio = small ? 1.0 - h * h / 6.0 : std::sin(h) / h;
-  const double slope = small ? -h / 3.0 : (std::cos(h) - ratio) / h;
+  const double sin_h = h != 0.0 ? std::sin(h) : 0.0, cos_h = h != 0.0 ? std::cos(h) : 1.0;
+  const double ratio = small ? 1.0 - h * h / 6.0 : sin_h / h;
+  const double slope = small ? -h / 3.0 : (cos_h - ratio) / h;
   Arc a;
   a.turned = turned;
   a.distance = distance;
   a.along << std::cos(yaw), std::sin(yaw);
-  Eigen::Vector2d direction = a.along;
-  if (turned != 0.0) direction << std::cos(yaw + h), std::sin(yaw + h);
+  const Eigen::Vector2d direction(cos_h * a.along.x() - sin_h * a.along.y(), cos_h * a.along.y() + sin_h * a.along.x());
   const Eigen::Vector2d left(-direction.y(), direction.x());
   a.displacement = distance * ratio * direction;
   a.by_yaw = distance * ratio * left;
@@ -66,18 +66,47 @@ BaseMatrix jacobian(MotionKind kind, double dt, const Arc& a) {
   return F;
 }
 
-/// F P F' where only the base moves, by the few elements of F that are neither zero nor on the diagonal.
-void carry(Matrix& P, const BaseMatrix& F) {
+/// F M for rows of the base, by the few elements of F that are neither zero nor on the diagonal.
+inline void carry_column(double* c, const BaseMatrix& F) {
   for (int i = 0; i < 2; ++i) {
-    P.col(i) += F(i, kYaw) * P.col(kYaw) + F(i, kSpeed) * P.col(kSpeed) + F(i, kAccel) * P.col(kAccel) +
-                F(i, kTurn) * P.col(kTurn);
+    c[i] += F(i, kYaw) * c[kYaw] + F(i, kSpeed) * c[kSpeed] + F(i, kAccel) * c[kAccel] + F(i, kTurn) * c[kTurn];
   }
-  P.col(kYaw) += F(kYaw, kTurn) * P.col(kTurn);
-  P.col(kSpeed) += F(kSpeed, kAccel) * P.col(kAccel);
-  P.col(kTurn) *= F(kTurn, kTurn);
-  P.topRightCorner<kBase, kSize - kBase>() = P.bottomLeftCorner<kSize - kBase, kBase>().transpose();
-  const BaseMatrix base = F.lazyProduct(P.topLeftCorner<kBase, kBase>());
-  P.topLeftCorner<kBase, kBase>() = 0.5 * (base + base.transpose());
+  c[kYaw] += F(kYaw, kTurn) * c[kTurn];
+  c[kSpeed] += F(kSpeed, kAccel) * c[kAccel];
+  c[kTurn] *= F(kTurn, kTurn);
+}
+
+/// F P F' where only the base moves.
+template <int Registers, int Columns>
+void carry(Matrix& P, const BaseMatrix& F) {
+  Register *east = column(P, kPos), *north = column(P, kPos + 1), *yaw = column(P, kYaw);
+  Register *speed = column(P, kSpeed), *accel = column(P, kAccel), *turn = column(P, kTurn);
+  const double yaw_by_turn = F(kYaw, kTurn), speed_by_accel = F(kSpeed, kAccel), turn_left = F(kTurn, kTurn);
+  const Eigen::Vector2d by_yaw = F.block<2, 1>(kPos, kYaw), by_speed = F.block<2, 1>(kPos, kSpeed);
+  const Eigen::Vector2d by_accel = F.block<2, 1>(kPos, kAccel), by_turn = F.block<2, 1>(kPos, kTurn);
+  for (int i = 0; i < Registers; ++i) {
+    east[i] += by_yaw(0) * yaw[i] + by_speed(0) * speed[i] + by_accel(0) * accel[i] + by_turn(0) * turn[i];
+    north[i] += by_yaw(1) * yaw[i] + by_speed(1) * speed[i] + by_accel(1) * accel[i] + by_turn(1) * turn[i];
+    yaw[i] += yaw_by_turn * turn[i];
+    speed[i] += speed_by_accel * accel[i];
+    turn[i] *= turn_left;
+  }
+  for (int j = 0; j < kBase; ++j) carry_column(P.col(j).data(), F);
+  for (int j = 1; j < kBase; ++j)
+    for (int i = 0; i < j; ++i) P(i, j) = P(j, i);
+  for (int j = kBase; j < Columns; ++j) {
+    const double* row = P.data() + j;
+    double* out = P.data() + j * kSize;
+    each_register<kBase>([&](int i) { out[i] = row[i * kSize]; });
+  }
+}
+
+/// What a clone of the pose would be: its own rows do not move.
+void keep(const FusionEstimate& e, const Arc& a, PoseBefore& before) {
+  before.pose = e.x.segment<3>(kPos);
+  before.heading = a.along;
+  before.P = e.P.block<3, 3>(kPos, kPos);
+  before.with = e.P.middleCols<3>(kPos);
 }
 
 }  // namespace
@@ -92,9 +121,14 @@ BaseMatrix moved_jacobian(const Vector& x, MotionKind kind, double dt) {
   return jacobian(kind, dt, arc_of(x, kind, dt));
 }
 
-void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt) {
+void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt, PoseBefore* before) {
   const Arc a = arc_of(e.x, kind, dt);
-  carry(e.P, jacobian(kind, dt, a));
+  const BaseMatrix F = jacobian(kind, dt, a);
+  if (before != nullptr) {
+    keep(e, a, *before);
+    for (int k = 0; k < 3; ++k) carry_column(before->with.col(k).data(), F);
+  }
+  with_size(e, [&](auto length, auto columns) { carry<length, columns>(e.P, F); });
 
   const double q = noise.jerk * noise.jerk;
   e.P(kAccel, kAccel) += q * dt;
@@ -107,13 +141,13 @@ void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double d
   const bool turning = kind == MotionKind::kConstantTurn;
   const double sigma = turning ? noise.turn_change : noise.straight_turn;
   const double share = turning ? 0.5 : 1.0;  // a rate that changes evenly is half there in the mean
-  Eigen::Vector4d G;                         // east, north, yaw, yaw rate
-  G << share * dt * a.by_turn, share * dt, 1.0;
-  G *= sigma;
-  e.P.block<3, 3>(kPos, kPos) += G.head<3>() * G.head<3>().transpose();
-  e.P.block<3, 1>(kPos, kTurn) += G(3) * G.head<3>();
-  e.P.block<1, 3>(kTurn, kPos) += G(3) * G.head<3>().transpose();
-  e.P(kTurn, kTurn) += G(3) * G(3);
+  const double by = share * dt;
+  const Eigen::Vector4d G(sigma * (by * a.by_turn.x()), sigma * (by * a.by_turn.y()), sigma * by, sigma);
+  constexpr int kTurns[] = {kPos, kPos + 1, kYaw, kTurn};
+  for (int j = 0; j < 4; ++j) {
+    double* out = e.P.data() + kTurns[j] * kSize;
+    each_register<4>([&](int i) { out[kTurns[i]] += G(i) * G(j); });
+  }
 
   // A slip that lasts for a while, as the white noise that displaces as much.
   const double slip = noise.slip + noise.slip_arm * std::abs(e.x(kTurn));

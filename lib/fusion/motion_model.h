@@ -28,8 +28,16 @@ fusion::Vector moved(const fusion::Vector& x, MotionKind kind, double dt);
 using BaseMatrix = Eigen::Matrix<double, fusion::kBase, fusion::kBase>;
 BaseMatrix moved_jacobian(const fusion::Vector& x, MotionKind kind, double dt);
 
-/// Mean and covariance after dt, (F.5).
-void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt);
+/// The pose before a move, as a clone would have kept it.
+struct PoseBefore {
+  Eigen::Vector3d pose = Eigen::Vector3d::Zero();
+  Eigen::Vector2d heading = Eigen::Vector2d::UnitX();  ///< cosine and sine of its yaw
+  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, fusion::kSize, 3> with = Eigen::Matrix<double, fusion::kSize, 3>::Zero();  ///< cov(state, it)
+};
+
+/// Mean and covariance after dt, (F.5). `before`: what a clone of the pose would have been after it.
+void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt, PoseBefore* before = nullptr);
 
 template <class Visitor>
 void visit(MotionNoise& c, Visitor& v) {

@@ -12,6 +12,7 @@ namespace {
 constexpr double kLocalFloor = 1e-5;   ///< m and rad, of one motion
 constexpr double kHeightShare = 0.01;  ///< of the way: what a height loses by it, at least
 constexpr double kHeightFloor = 0.01;  ///< m per sqrt(s)
+constexpr double kGimbalLock = 1e-9;   ///< cosine of the pitch, as in euler.cpp
 
 Eigen::Matrix2d rotation(double yaw) { return Eigen::Rotation2Dd(yaw).toRotationMatrix(); }
 
@@ -43,11 +44,15 @@ Eigen::Matrix2d horizontal_velocity_covariance(const Odometry& o) {
 }
 
 LevelView level_view(const Odometry& o) {
-  const YawPitchRoll a = yaw_pitch_roll(o.T_frame_vehicle.q);
-  const double sr = std::sin(a.roll), cr = std::cos(a.roll), sp = std::sin(a.pitch), cp = std::cos(a.pitch);
+  const Eigen::Matrix3d R = o.T_frame_vehicle.R();
+  // Sine and cosine of pitch and roll as yaw_pitch_roll() has them, without the angles.
+  const double sp = -R(2, 0), cp = std::sqrt(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0));
+  const bool level = cp > kGimbalLock;
+  const double sr = level ? R(2, 1) / cp : 0.0, cr = level ? R(2, 2) / cp : 1.0;
   LevelView view;
   view.t_us = o.t_us;
-  view.pose << o.T_frame_vehicle.p.x(), o.T_frame_vehicle.p.y(), a.yaw;
+  view.pose << o.T_frame_vehicle.p.x(), o.T_frame_vehicle.p.y(),
+      level ? std::atan2(R(1, 0), R(0, 0)) : std::atan2(-R(0, 1), R(1, 1));
   view.P = planar_covariance(o.cov_pose, sr / cp, cr / cp);
   view.turn = (o.angular_rate.y() * sr + o.angular_rate.z() * cr) / cp;
   const double down = o.velocity.y() * sr + o.velocity.z() * cr;  // Ry(pitch) Rx(roll) v
@@ -124,28 +129,64 @@ MovedPlanar moved_by(const Planar& a, const Planar& motion) {
   return m;
 }
 
-Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, const Planar& motion,
-                                  const Eigen::Matrix3d& P_b, const Eigen::Vector3d& floor_sigma) {
-  const MovedPlanar moved = moved_by(a, motion);
-  const Eigen::Matrix3d grown = P_b - moved.by_start * P_a * moved.by_start.transpose();
-  const Eigen::Matrix3d to_start = moved.by_motion.transpose();
-  const Eigen::Matrix3d in_start = to_start * grown * to_start.transpose();
-  const Eigen::Matrix3d above = in_start - Eigen::Matrix3d(floor_sigma.cwiseAbs2().asDiagonal());
-  if (Eigen::LLT<Eigen::Matrix3d>(above).info() == Eigen::Success) return 0.5 * (in_start + in_start.transpose());
+Eigen::Matrix3d turned(const Eigen::Matrix3d& P, double c, double s) {
+  const double cross = 0.5 * (P(0, 1) + P(1, 0));
+  Eigen::Matrix3d C;
+  C(0, 0) = c * c * P(0, 0) - 2.0 * c * s * cross + s * s * P(1, 1);
+  C(1, 1) = s * s * P(0, 0) + 2.0 * c * s * cross + c * c * P(1, 1);
+  C(0, 1) = C(1, 0) = c * s * (P(0, 0) - P(1, 1)) + (c * c - s * s) * cross;
+  C(0, 2) = C(2, 0) = c * P(0, 2) - s * P(1, 2);
+  C(1, 2) = C(2, 1) = s * P(0, 2) + c * P(1, 2);
+  C(2, 2) = P(2, 2);
+  return C;
+}
+
+namespace {
+
+/// P of a pose, carried along a way (in its frame) that turns with its yaw: J P J' of moved_by's by_start J.
+Eigen::Matrix3d carried_along(const Eigen::Matrix3d& P, const Eigen::Vector2d& way) {
+  const Eigen::Vector2d by_yaw(-way.y(), way.x());
+  const Eigen::Vector2d with_yaw = P.block<2, 1>(0, 2) + by_yaw * P(2, 2);
+  Eigen::Matrix3d C = P;
+  for (int j = 0; j < 2; ++j)
+    for (int i = 0; i < 2; ++i) C(i, j) += by_yaw(i) * P(2, j) + with_yaw(i) * by_yaw(j);
+  for (int i = 0; i < 2; ++i) C(i, 2) = C(2, i) = with_yaw(i);
+  return C;
+}
+
+bool positive(const Eigen::Matrix3d& S) {
+  const double minor = S(0, 0) * S(1, 1) - S(1, 0) * S(1, 0);
+  const double a = S(1, 0) * S(2, 1) - S(1, 1) * S(2, 0), b = S(1, 0) * S(2, 0) - S(0, 0) * S(2, 1);
+  return S(0, 0) > 0.0 && minor > 0.0 && S(2, 2) * minor + S(2, 0) * a + S(2, 1) * b > 0.0;
+}
+
+/// What is less than the floor, direction by direction, is the floor.
+Eigen::Matrix3d at_least(const Eigen::Matrix3d& P, const Eigen::Vector3d& floor_sigma) {
+  if (positive(P - Eigen::Matrix3d(floor_sigma.cwiseAbs2().asDiagonal()))) return P;
   // In units of the floor, so that metres and radians may share an eigenvalue problem.
   const Eigen::Matrix3d unit = floor_sigma.asDiagonal(), inverse = floor_sigma.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * inverse * (in_start + in_start.transpose()) *
-                                                              inverse);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inverse * P * inverse);
   const Eigen::Vector3d kept = solver.eigenvalues().cwiseMax(1.0);
   return unit * solver.eigenvectors() * kept.asDiagonal() * solver.eigenvectors().transpose() * unit;
+}
+
+}  // namespace
+
+Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, const Planar& motion,
+                                  const Eigen::Matrix3d& P_b, const Eigen::Vector3d& floor_sigma) {
+  const double c = std::cos(a.z()), s = std::sin(a.z());
+  const Eigen::Vector2d way(c * motion.x() - s * motion.y(), s * motion.x() + c * motion.y());
+  return at_least(turned(P_b - carried_along(P_a, way), c, -s), floor_sigma);
 }
 
 PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
                            const Eigen::Matrix3d& P_end) {
   const Eigen::Matrix3d R =
       motion_covariance(start.pose, start.P, motion, P_end, Eigen::Vector3d::Constant(kLocalFloor));
-  const MovedPlanar m = moved_by(other.pose, motion);
-  return {m.pose, m.by_start * other.P * m.by_start.transpose() + m.by_motion * R * m.by_motion.transpose()};
+  const double c = std::cos(other.pose.z()), s = std::sin(other.pose.z());
+  const Eigen::Vector2d way(c * motion.x() - s * motion.y(), s * motion.x() + c * motion.y());
+  return {{other.pose.x() + way.x(), other.pose.y() + way.y(), wrap_angle(other.pose.z() + motion.z())},
+          carried_along(other.P, way) + turned(R, c, s)};
 }
 
 double height_growth(double way, double dt) {

@@ -52,6 +52,9 @@ struct MovedPlanar {
 };
 MovedPlanar moved_by(const Planar& a, const Planar& motion);
 
+/// T P T' of a pose's covariance: as a frame sees it in which the first one is turned by an angle of cosine c, sine s.
+Eigen::Matrix3d turned(const Eigen::Matrix3d& P, double c, double s);
+
 /// Covariance of the motion between two poses of one estimator, in the axes of a, if its errors were a sum of
 /// independent steps: what the second covariance has more than the first carried along (F.12). Directions in which it
 /// shrank, because the estimator learnt something, get the floor.

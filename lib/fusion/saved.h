@@ -32,10 +32,12 @@ void read(StateReader& r, std::optional<T>& value) {
 inline void write(StateWriter& w, const FusionEstimate& e) {
   w.put(States(e.x.head<kStates>()));
   w.put(StatesCovariance(e.P.topLeftCorner<kStates, kStates>()));
+  w.put(e.cloned);
 }
 inline void read(StateReader& r, FusionEstimate& e) {
   e.x.head<kStates>() = r.get<States>();
   e.P.topLeftCorner<kStates, kStates>() = r.get<StatesCovariance>();
+  e.cloned = r.get<bool>();
 }
 
 /// `Pose` is Odometry or const Odometry.

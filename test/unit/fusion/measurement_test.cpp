@@ -72,7 +72,7 @@ TEST_CASE("motion carried on is the update of a pose of which no model knows any
     FusionEstimate updated = carried;
     const Planar motion = draws.vector<3>(0.5);
     const Eigen::Matrix3d R = Eigen::Vector3d(1e-4, 4e-4, 1e-6).asDiagonal();
-    carry_on(carried, kInertial, motion, 0.3, R, true);
+    carry_on(carried, motion, 0.3, R, true);
     // Independent of all else and unknown; linearised where the update ends, for it is not linear in the yaw.
     for (int k = 0; k < 3; ++k) set_independent(updated, kPos + k, carried.x(kPos + k), 1e4);
     const FusionMeasurement<3> m = relative_motion(updated.x, kInertial, motion, 0.3, R);
@@ -83,7 +83,7 @@ TEST_CASE("motion carried on is the update of a pose of which no model knows any
     // What a model knows is used by the update and not by this.
     FusionEstimate known = random_estimate(draws);
     const FusionEstimate before = known;
-    carry_on(known, kInertial, motion, 0.3, R, true);
+    carry_on(known, motion, 0.3, R, true);
     CHECK((known.x - before.x).segment<3>(kPos).norm() > 0.1);
     CHECK((known.x - before.x).tail<kSize - 3>().norm() == 0.0);
   }
@@ -150,6 +150,61 @@ TEST_CASE("what pictures err by anew does not shorten the lengths") {
   CHECK(measured > 1.0);  // teeth
 }
 
+Eigen::Matrix<double, 1, kSize> dense(const ScalarMeasurement& m) {
+  Eigen::Matrix<double, 1, kSize> H = Eigen::Matrix<double, 1, kSize>::Zero();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(m.count); ++k) H(m.index[k]) = m.h[k];
+  return H;
+}
+
+TEST_CASE("two numbers told in one walk over the covariance are two updates") {
+  Draws draws(23);
+  for (int i = 0; i < 20; ++i) {
+    FusionEstimate together = random_estimate(draws);
+    set_cloned(together, i % 2 == 0);
+    FusionEstimate apart = together, wrong = together;
+    const ScalarUpdate turn = begin_update(together, told_turn(together.x, 0.1, 0.01));
+    const ScalarMeasurement speed = told_speed(together.x, kInertial, 5.0, 0.01);
+    const ScalarUpdate then = begin_update(together, speed, &turn);
+    finish_update(together, turn, then);
+    const auto update = [](FusionEstimate& e, const ScalarMeasurement& m) {
+      const Eigen::Matrix<double, 1, 1> d(m.innovation), R(m.variance);
+      return kalman_update<1>(e, dense(m), d, R);
+    };
+    update(apart, told_turn(apart.x, 0.1, 0.01));
+    const FusionInnovation<1> last = update(apart, told_speed(apart.x, kInertial, 5.0, 0.01));
+    CHECK((together.x - apart.x).norm() < 1e-12);
+    CHECK((together.P - apart.P).norm() < 1e-12);
+    CHECK(then.log_likelihood() == Approx(last.log_likelihood).epsilon(1e-12));
+    finish_update(wrong, turn, begin_update(wrong, speed));  // teeth: the second does not know of the first
+    CHECK((wrong.P - apart.P).norm() > 1e-6);
+  }
+}
+
+TEST_CASE("a clone that is the pose itself needs no rows of its own") {
+  Draws draws(24);
+  const MotionNoise noise;
+  for (const MotionKind kind : {MotionKind::kConstantAcceleration, MotionKind::kConstantTurn}) {
+    for (const bool with_yaw : {true, false}) {
+      FusionEstimate clone = random_estimate(draws);
+      clone_pose(clone, kInsClone);
+      FusionEstimate none = clone;
+      set_cloned(none, false);
+      PoseBefore before;
+      move(clone, kind, noise, 0.01);
+      move(none, kind, noise, 0.01, &before);
+      const Planar motion = draws.vector<3>(0.5);
+      const Eigen::Matrix3d R = Eigen::Vector3d(1e-4, 4e-4, 1e-6).asDiagonal();
+      const CarriedOn a = carry_on(clone, motion, 0.01, R, with_yaw);
+      const CarriedOn b = carry_on(none, before, motion, 0.01, R, with_yaw);
+      CHECK(a.innovation.nis == Approx(b.innovation.nis).epsilon(1e-12));
+      clone_pose(clone, kInsClone);
+      set_cloned(none, true);
+      CHECK((clone.x - none.x).norm() < 1e-12);
+      CHECK((clone.P - none.P).norm() < 1e-12);
+    }
+  }
+}
+
 TEST_CASE("Jacobian of a channel's speed, with its scale or its velocity error") {
   Draws draws(22);
   for (int i = 0; i < 20; ++i) {
@@ -158,10 +213,10 @@ TEST_CASE("Jacobian of a channel's speed, with its scale or its velocity error")
       const auto h = [&](const Vector& d) {
         Vector moved = plus(x, d);
         moved(kYaw) = x(kYaw);  // through which a velocity error of centimetres turns nothing
-        return Eigen::Matrix<double, 1, 1>(-channel_speed(moved, slots, 5.0, 0.01).innovation);
+        return Eigen::Matrix<double, 1, 1>(-told_speed(moved, slots, 5.0, 0.01).innovation);
       };
-      const FusionMeasurement<1> m = channel_speed(x, slots, 5.0, 0.01);
-      CHECK((m.H - test::numerical_jacobian<1, kSize>(h, 1e-5)).cwiseAbs().maxCoeff() < 1e-7);
+      const ScalarMeasurement m = told_speed(x, slots, 5.0, 0.01);
+      CHECK((dense(m) - test::numerical_jacobian<1, kSize>(h, 1e-5)).cwiseAbs().maxCoeff() < 1e-7);
     }
   }
 }
