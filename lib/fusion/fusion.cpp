@@ -132,7 +132,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
     place(s.odometry);
     return FuseStatus::kAccepted;
   }
-  move_height(s);
+  move_height(s, view);
   const FuseStatus status = fuse_motion(s, view, report);
   fuse_rates(s, view, !ins && status == FuseStatus::kAccepted);
   const PlanarMixture after = combine_planar(imm_);
@@ -142,7 +142,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
 
 /// The first sample: position, yaw and speed as it says; a channel without enu gives a local frame only.
 void Fusion::start(const ChannelSample& s) {
-  t_us_ = s.odometry.t_us;
+  t_us_ = height_us_ = s.odometry.t_us;
   attitude_ = s.odometry;
   FusionEstimate e;
   const bool enu = s.channel == FusionChannel::kIns;
@@ -185,6 +185,7 @@ void Fusion::place(const Odometry& o) {
   for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) memory(c).last.reset();
   height_ = o.T_frame_vehicle.p.z();
   height_variance_ = o.cov_pose(2, 2);
+  height_us_ = t_us_;
   tie_.forget();
   placed_ = true;
   foreign_ = false;

@@ -193,7 +193,7 @@ class Fusion {
   void distrust_velocity(const Planar& difference);
   void give_way(const Planar& difference);
   void remember(const ChannelSample& sample, const LevelView& view);
-  void move_height(const ChannelSample& sample);
+  void move_height(const ChannelSample& sample, const LevelView& view);
   void gain_height(const Odometry& o);
   void follow_local(const Before& before, const PlanarMixture& now);
   void update_tie(const ChannelSample& sample);
@@ -226,6 +226,7 @@ class Fusion {
   std::array<double, kFusionChannels> information_{};
   double height_ = 0.0;           ///< m
   double height_variance_ = 1.0;  ///< m2
+  int64_t height_us_ = 0;         ///< until when somebody told it
   Odometry attitude_;             ///< newest roll and pitch, with their covariance
   bool gnss_ = false;
   double ins_drift_std_ = 0.0;  ///< rad/s

@@ -1,4 +1,5 @@
 // What the fusion tells: local pose, height, report, snapshot (MODEL.md, section 9).
+#include <algorithm>
 #include <cmath>
 
 #include "fusion/fusion.h"
@@ -12,6 +13,7 @@ using namespace fusion;
 
 namespace {
 
+constexpr double kClimbsOn = 1.0;     ///< s: a velocity tells the rise of no longer time
 constexpr double kLostSigma = 100.0;  ///< m: nobody should drive by this
 
 }  // namespace
@@ -32,16 +34,22 @@ void Fusion::follow_local(const Before& before, const PlanarMixture& now) {
   local_ = moved_along(local_, before.at.planar, motion, now.planar.P);
 }
 
-/// Height by the channel that speaks for the motion: its own steps, with what its covariance grows by.
-void Fusion::move_height(const ChannelSample& s) {
+/// Height by the channel that speaks for the motion: its own step, with what its covariance grows by. Where another
+/// one told part of it, or nobody a part before it (the INS fell silent, or is back), by its velocity since the height
+/// was last told.
+void Fusion::move_height(const ChannelSample& s, const LevelView& view) {
   const Memory& m = memory(s.channel);
   const bool speaks = s.channel == FusionChannel::kIns || !alive(FusionChannel::kIns);
   if (!speaks || !m.last || m.reset_counter != s.reset_counter || !s.metric) return;
-  const double dt = seconds_between(m.last->t_us, t_us_);
-  double step = s.odometry.T_frame_vehicle.p.z() - m.last->T_frame_vehicle.p.z();
+  const double dt = seconds_between(height_us_, t_us_);
   const double way = s.odometry.velocity.norm() * dt;
-  if (std::abs(step) > config_.jump_tolerance + 0.3 * way) step = 0.0;
-  const double grown = std::max(s.odometry.cov_pose(2, 2) - m.last->cov_pose(2, 2), height_growth(way, dt));
+  double step = view.velocity.z() * std::min(dt, kClimbsOn), grown = height_growth(way, dt);
+  if (m.last->t_us == height_us_) {
+    step = s.odometry.T_frame_vehicle.p.z() - m.last->T_frame_vehicle.p.z();
+    if (std::abs(step) > config_.jump_tolerance + 0.3 * way) step = 0.0;
+    grown = std::max(grown, s.odometry.cov_pose(2, 2) - m.last->cov_pose(2, 2));
+  }
+  height_us_ = t_us_;
   height_ += step;
   height_variance_ += grown;
   local_height_ += step;
@@ -54,6 +62,7 @@ void Fusion::gain_height(const Odometry& o) {
   take_height(comeback_, config_.comeback, o.T_frame_vehicle.p.z() - height_);
   height_ = o.T_frame_vehicle.p.z();
   height_variance_ = o.cov_pose(2, 2);
+  height_us_ = t_us_;
 }
 
 FusionReport Fusion::report() const {
@@ -110,7 +119,8 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
   visit_odometry(self.attitude_, visit);
   FrameTie::visit_members(self.tie_, visit);
   visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.foreign_, self.ins_corrected_,
-        self.passes_needed_, self.doubt_, self.distrust_, self.ins_drift_std_, self.last_tie_us_, self.vo_scale_open_);
+        self.passes_needed_, self.doubt_, self.distrust_, self.ins_drift_std_, self.last_tie_us_, self.vo_scale_open_,
+        self.height_us_);
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);

@@ -115,5 +115,54 @@ TEST_CASE("a yaw rate from the motion that was used already tells nothing more")
   CHECK(boasting > 8.0);  // teeth
 }
 
+/// Largest error of the height, and of the local pose's rise, on a road that climbs while the IMU is unplugged for five
+/// seconds; vision sees the climb, or does not.
+struct Heights {
+  double fused = 0.0, local = 0.0;  ///< m
+};
+Heights climbing(bool seen) {
+  constexpr double kClimb = 0.5, kBack = 25.0;  // m/s; s
+  Tunnel t;
+  t.ins.outages.clear();
+  t.with_wheels = false;
+  t.vo.scale_std = 0.0;
+  const auto truth = [&](int64_t t_us) {
+    return t.drive.truth_at(t_us).T_frame_vehicle.p.z() + kClimb * seconds(t.drive, t_us);
+  };
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events) {
+    Odometry& o = e.sample.odometry;
+    if (e.sample.channel == FusionChannel::kVo && !seen) continue;
+    o.T_frame_vehicle.p.z() += kClimb * seconds(t.drive, o.t_us);
+    o.velocity += kClimb * (o.T_frame_vehicle.q.conjugate() * Eigen::Vector3d::UnitZ());
+  }
+  std::erase_if(events, [&](const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    return e.sample.channel == FusionChannel::kIns && s > kFrom && s <= kBack;
+  });
+  Fusion fusion({});
+  Heights h;
+  std::optional<double> start;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    const int64_t t_us = e.sample.odometry.t_us;
+    const double s = seconds(t.drive, t_us);
+    if (s < kFrom - 1.0 || s > kBack + 2.0) return;
+    const double local = f.local().T_frame_vehicle.p.z() - truth(t_us);
+    if (!start) start = local;
+    h.local = std::max(h.local, std::abs(local - *start));
+    h.fused = std::max(h.fused, std::abs(f.fused().T_frame_vehicle.p.z() - truth(t_us)));
+  });
+  return h;
+}
+
+TEST_CASE("what the car climbs while the IMU is unplugged counts once") {
+  const Heights seen = climbing(true), unseen = climbing(false);
+  INFO("seen " << seen.fused << " m, local " << seen.local << "; unseen " << unseen.fused << ", " << unseen.local);
+  CHECK(seen.fused < 0.5);
+  CHECK(seen.local < 0.5);
+  CHECK(unseen.fused > 1.5);  // teeth: 2.5 m of climb
+  CHECK(unseen.local > 1.5);
+}
+
 }  // namespace
 }  // namespace roadfix
