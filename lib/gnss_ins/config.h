@@ -72,7 +72,7 @@ struct AidingConfig {
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
   double start_std = 0.1;           ///< m/s, before anything is learnt
-  double min_std = 0.001;           ///< m/s, so that it can grow again
+  double min_std = 0.001;           ///< m/s, the least that is used
   double max_std = 0.5;             ///< m/s
   double start_slope = 0.03;        ///< s: m/s per m/s2 of acceleration, likewise (rear slip angle at 10 m/s)
   double prior_count = 0.2;         ///< residuals that the start counts for
@@ -91,7 +91,7 @@ struct PropagationConfig {
   double max_accel = 200.0;           ///< m/s2
   double vibration_factor = 1.0;      ///< white noise taken from the measured sample-to-sample scatter
   double time_offset_walk = 5.0e-3;   ///< s/sqrt(s), of the IMU's stamps, where time_offset_std is not zero
-  double wheel_scale_walk = 3.0e-5;   ///< 1/sqrt(s)
+  double wheel_scale_walk = 1.3e-5;   ///< 1/sqrt(s): over a minute, what a tyre grows that warms up (MODEL.md)
   double mounting_walk = 1.0e-5;      ///< rad/sqrt(s)
 };
 

@@ -9,7 +9,10 @@ namespace {
 
 constexpr double kMostRatio = 16.0;  // a residual counts at most as four sigma
 constexpr double kMostCorrelation = 0.9;
-constexpr double kLeastSlope = 2.0e-3;  // s, so that a slope can be learnt again
+// So that both can grow again: a tenth of the least that is used, and of what tyres slip at walking pace (3.6 mrad per
+// m/s2, config.h).
+constexpr double kLeastLearnt = 1.0e-4;  // m/s
+constexpr double kLeastSlope = 2.0e-4;   // s
 
 }  // namespace
 
@@ -29,7 +32,7 @@ double LearntVariance::careful(double confidence) const {
 
 SideslipNoise::SideslipNoise(const SideslipConfig& config, double prior_count)
     : config_(config),
-      straight_(config.start_std, config.min_std, prior_count),
+      straight_(config.start_std, kLeastLearnt, prior_count),
       slope_(config.start_slope, kLeastSlope, prior_count) {}
 
 double SideslipNoise::correlation() const { return std::clamp(product_ - persisting_, 0.0, kMostCorrelation); }
@@ -38,7 +41,7 @@ double SideslipNoise::sigma(double acceleration) const {
   const double inflation = (1.0 + correlation()) / (1.0 - correlation());
   const double square = acceleration * acceleration;
   const double variance = straight_.careful(config_.confidence) + square * slope_.careful(config_.confidence);
-  return std::min(std::sqrt(inflation * variance), config_.max_std);
+  return std::clamp(std::sqrt(inflation * variance), config_.min_std, config_.max_std);
 }
 
 void SideslipNoise::learn(const SideslipResidual& seen, double acceleration) {

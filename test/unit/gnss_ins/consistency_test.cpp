@@ -1,4 +1,5 @@
-// Are the covariances what the errors are? 50 simulated drives; NEES at one late epoch per drive, NIS per source.
+// Are the covariances what the errors are? 50 simulated drives; NEES at one late epoch per drive, NIS per source. And
+// eighty at the end of a minute of tunnel, where wheels and the no-sideslip constraint are all there is.
 #include <catch2/catch.hpp>
 
 #include "filter_run.h"
@@ -115,4 +116,56 @@ TEST_CASE("the consistency test sees too much process noise") {
   });
   print("process noise x 16", o);
   CHECK(all(o) < 0.84);
+}
+
+namespace {
+
+constexpr int kTunnels = 80;
+constexpr double kTunnelEnd = 149.0;  // s
+
+/// Mean of the squared errors along and across the car over their variances, at the tunnel's end.
+Eigen::Vector2d tunnel_ratios(const std::function<void(GnssInsConfig&)>& change) {
+  ScenarioConfig truth = scenario("tunnel_dark");
+  truth.camera.layout = CameraLayout::kNone;
+  truth.duration_s = kTunnelEnd + 0.5;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (int seed = 1; seed <= kTunnels; ++seed) {
+    const SimulatedDrive drive = simulate(truth, static_cast<uint64_t>(seed));
+    GnssInsConfig config = test::filter_config(truth);
+    change(config);
+    GnssIns filter(config);
+    bool done = false;
+    test::run(filter, test::Samples(drive), [&](GnssIns& f, int64_t now) {
+      f.clear_records();
+      if (done || seconds_between(drive.imu.front().t_us, now) < kTunnelEnd) return;
+      done = true;
+      const Odometry o = f.output().odometry;
+      const Eigen::Vector3d forward = o.T_frame_vehicle.q * Eigen::Vector3d::UnitX();
+      Eigen::Matrix2d to_car;
+      to_car << forward.x(), forward.y(), -forward.y(), forward.x();
+      to_car /= forward.head<2>().norm();
+      const Eigen::Vector2d e = to_car * test::error_of(f, o, drive).head<2>();
+      const Eigen::Matrix2d P = to_car * o.cov_pose.topLeftCorner<2, 2>() * to_car.transpose();
+      sum += e.cwiseAbs2().cwiseQuotient(P.diagonal());
+    });
+  }
+  return sum / kTunnels;
+}
+
+}  // namespace
+
+TEST_CASE("at the end of a tunnel the errors along and across the car are as large as is claimed") {
+  // Ratios over eighty drives scatter by 0.16.
+  const Eigen::Vector2d now = tunnel_ratios([](GnssInsConfig&) {});
+  std::printf("at a tunnel's end: along %.2f, across %.2f\n", now.x(), now.y());
+  CHECK(now.minCoeff() > 0.65);
+  CHECK(now.maxCoeff() < 1.4);
+  // Teeth: a wheel scale that is held for exact, wheels that are held for five times as noisy as they are, and a gyro
+  // that is held for three times as quiet whatever it shows.
+  CHECK(tunnel_ratios([](GnssInsConfig& c) { c.vehicle.wheel_scale_std = 0.0; }).x() > 1.4);
+  CHECK(tunnel_ratios([](GnssInsConfig& c) { c.vehicle.wheel_noise *= 5.0; }).x() < 0.65);
+  CHECK(tunnel_ratios([](GnssInsConfig& c) {
+          c.vehicle.gyro_noise *= 0.3;
+          c.propagation.vibration_factor = 0.3;
+        }).y() > 1.4);
 }
