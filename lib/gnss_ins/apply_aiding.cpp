@@ -26,13 +26,16 @@ AidingRecord not_ready(AidingSource source, int64_t t_us) {
 }
 
 /// Takes into account what the linear H leaves out of one axis of the vehicle's velocity, used every `interval_s`,
-/// while the heading is unsure. `gain`: of the measurement by that velocity.
+/// while the heading is unsure. `gain`: of the measurement by that velocity. The update takes it for an error that
+/// lasts; gate and likelihood ask for one residual, and with more they forgave hypotheses what only the right one may.
 void straighten(Measurement<1>& m, const InsCore& core, int axis, double gain, double interval_s) {
   if (core.heading_std() < kSureHeading) return;
   const SecondOrder bent = bent_velocity(core.state(), core.last_covariance());
   const double rho = std::exp(-interval_s / kBentTime);
   m.residual(0) -= gain * bent.mean(axis);
-  m.R(0, 0) += gain * gain * bent.variance(axis) * (1.0 + rho) / (1.0 - rho);  // Bartlett 1946
+  const double known = m.R(0, 0), left_out = gain * gain * bent.variance(axis);
+  m.R(0, 0) += left_out;
+  m.alike = (known + left_out * (1.0 + rho) / (1.0 - rho)) / m.R(0, 0);  // Bartlett 1946
 }
 
 Measurement<3> position_of(const InsCore& core, const Pending& p, const Eigen::Vector3d& lever) {

@@ -142,12 +142,24 @@ TEST_CASE(
   test::RandomState random(5);
   NavState x = random.state(0.0);
   x.velocity = x.q_enu_imu * Eigen::Vector3d(10.0, 0.0, 0.0);
-  const auto variance = [&](const GnssInsConfig& used, Beside beside) {
+  const Eigen::Vector3d across = x.q_enu_imu * (x.R_imu_vehicle() * Eigen::Vector3d::UnitY());
+  struct Use {
+    double innovation = 0.0, left = 0.0;  ///< variances of the innovation, and of the velocity across after the update
+  };
+  const auto use = [&](const GnssInsConfig& used, Beside beside) {
     InsCore core(used, Geodetic{0.84, 0.2, 500.0});
     core.initialise(x, 0.01 * ErrorMatrix::Identity());  // 6 deg and 0.1 m/s among them
-    return AidingApplier(used).sideslip(core, Gates(5.0), beside).innovation_variance[0];
+    const double innovation = AidingApplier(used).sideslip(core, Gates(5.0), beside).innovation_variance[0];
+    return Use{innovation, across.dot(core.covariance().block<3, 3>(kVel, kVel) * across)};
   };
-  CHECK(variance(config, Beside::kNothing) == variance(linear, Beside::kNothing));
-  for (const Beside beside : {Beside::kFixes, Beside::kSoughtHeading})
-    CHECK(variance(config, beside) > 1.01 * variance(linear, beside));
+  const Use plain = use(linear, Beside::kNothing), outage = use(config, Beside::kNothing);
+  CHECK(outage.innovation == plain.innovation);
+  CHECK(outage.left == plain.left);
+  for (const Beside beside : {Beside::kFixes, Beside::kSoughtHeading}) {
+    // The update takes them for errors that last, gate and likelihood for what one residual has of them.
+    const Use bent = use(config, beside);
+    CHECK(bent.left > 1.0001 * plain.left);
+    CHECK(bent.innovation > plain.innovation);
+    CHECK(bent.innovation < 1.01 * plain.innovation);
+  }
 }

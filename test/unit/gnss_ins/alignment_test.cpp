@@ -267,7 +267,7 @@ TEST_CASE("a heading that is confirmed from poor fixes is the right way round an
     print("second order", seen);
     print("linear", linear);
     CHECK(seen.wrong_ways == 0);
-    CHECK(seen.known > 0.95);
+    CHECK(seen.known > 0.98);
     CHECK(seen.turns < 2.2);
     // Teeth.
     wrong_if_linear += linear.wrong_ways;
