@@ -46,6 +46,53 @@ Eigen::Vector3d separation(const BundleProblem& problem, const BundleProblem::Di
          problem.views[static_cast<size_t>(d.view_a)].T_map_camera.p;
 }
 
+/// One observation at the present values, in sigmas.
+struct Sight {
+  ReprojectionJacobian J;
+  Eigen::Vector2d residual;
+  double r2 = 0.0;
+  bool visible = false;
+};
+
+Sight sight(const BundleProblem& problem, const Eyes& eyes, const BundleProblem::Observation& o) {
+  const double scale = problem.focal_px / problem.sigma_px;
+  Sight s;
+  Eigen::Vector2d seen;
+  s.visible = eyes.of(o).see(problem.points[static_cast<size_t>(o.point)], seen, &s.J);
+  s.residual = scale * (o.normalised - seen);
+  s.r2 = s.residual.squaredNorm();
+  s.J.pose *= scale;
+  s.J.point *= scale;
+  s.J.correction *= scale;
+  return s;
+}
+
+/// What a track costs and how much it counts, (M.8b): Student's t over all its numbers.
+struct TrackCost {
+  double cost = 0.0;
+  double weight = 0.0;
+  double bend = 0.0;  ///< what the square of its score takes off the second derivative, (M.13b)
+};
+
+TrackCost track_cost(const std::vector<Sight>& sights, const BundleProblem& problem) {
+  TrackCost t;
+  double sum = 0.0, numbers = 0.0;
+  for (const Sight& s : sights) {
+    if (!s.visible) {
+      t.cost += kHiddenCost;
+      continue;
+    }
+    sum += 2.0 * robust_cost(s.r2, problem.huber);
+    numbers += 2.0;
+  }
+  if (numbers == 0.0) return t;
+  const double freedom = problem.track_freedom;
+  t.cost += 0.5 * (freedom + numbers) * std::log1p(sum / freedom);
+  t.weight = (freedom + numbers) / (freedom + sum);
+  t.bend = 2.0 / (freedom + numbers);
+  return t;
+}
+
 /// (M.8) and (M.9) at one point, which need the same reprojections.
 struct Linearised {
   NormalEquations equations;
@@ -57,28 +104,27 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
                      Purpose purpose = Purpose::kStep, std::vector<double>* error_px = nullptr) {
   Linearised result{NormalEquations(num_free, problem.points.size(), problem.observations.size())};
   const Eyes eyes(problem);
-  const double scale = problem.focal_px / problem.sigma_px;
   const LensCorrection::Vector lens = problem.lens_prior.value - problem.lens.value;
   result.cost = 0.5 * lens.dot(problem.lens_information * lens);
   result.equations.add_lens_prior(problem.lens_information, lens);
-  ReprojectionJacobian J;
-  Eigen::Vector2d seen;
-  for (const BundleProblem::Observation& o : problem.observations) {
-    const auto point = static_cast<size_t>(o.point);
-    const bool visible = eyes.of(o).see(problem.points[point], seen, &J);
-    const Eigen::Vector2d residual = scale * (o.normalised - seen);
-    const double r2 = residual.squaredNorm();
-    result.cost += visible ? robust_cost(r2, problem.huber) : kHiddenCost;
-    if (error_px != nullptr) {
-      error_px->push_back(visible ? problem.sigma_px * std::sqrt(r2) : std::numeric_limits<double>::infinity());
+  std::vector<Sight> sights;
+  for (auto o = problem.observations.begin(); o != problem.observations.end();) {
+    const auto track = o;
+    sights.clear();
+    while (o != problem.observations.end() && o->point == track->point) sights.push_back(sight(problem, eyes, *o++));
+    const TrackCost t = track_cost(sights, problem);
+    result.cost += t.cost;
+    auto seen = track;
+    for (const Sight& s : sights) {
+      const int view = free[static_cast<size_t>((seen++)->view)];
+      if (error_px != nullptr) {
+        error_px->push_back(s.visible ? problem.sigma_px * std::sqrt(s.r2) : std::numeric_limits<double>::infinity());
+      }
+      if (!s.visible) continue;
+      const double slope = t.weight * robust_weight(s.r2, problem.huber);
+      const double curvature = purpose == Purpose::kStep ? slope : t.weight * robust_curvature(s.r2, problem.huber);
+      result.equations.add(view, static_cast<size_t>(track->point), s.J, s.residual, {slope, curvature, t.bend});
     }
-    if (!visible) continue;
-    J.pose *= scale;
-    J.point *= scale;
-    J.correction *= scale;
-    const double slope = robust_weight(r2, problem.huber);
-    const double curvature = purpose == Purpose::kStep ? slope : robust_curvature(r2, problem.huber);
-    result.equations.add(free[static_cast<size_t>(o.view)], point, J, residual, {slope, curvature});
   }
   for (const BundleProblem::Distance& d : problem.distances) {
     const Eigen::Vector3d between = separation(problem, d);

@@ -41,7 +41,8 @@ struct BundleProblem {
   LensCorrection::Matrix lens_information = LensCorrection::Matrix::Identity();  ///< of the prior
   double focal_px = 0.0;
   double sigma_px = 0.5;
-  double huber = 2.0;  ///< sigmas beyond which an error counts linearly
+  double huber = 2.0;          ///< sigmas beyond which an error counts linearly
+  double track_freedom = 3.0;  ///< of Student's t over a track; infinite would be one sigma for all
 };
 
 struct BundleReport {

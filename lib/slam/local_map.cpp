@@ -107,6 +107,7 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
   problem.T_right_left = rig_.T_right_left;
   problem.focal_px = focal_px_;
   problem.sigma_px = config_.sigma_px;
+  problem.track_freedom = config_.track_freedom;
   problem.lens = problem.lens_prior = lens_;
   problem.lens_information = lens_information_;
   const size_t fixed = num_fixed();

@@ -20,6 +20,7 @@ NormalEquations::NormalEquations(int num_free_views, size_t num_points, size_t n
 void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual,
                           Weight weight) {
   Point& p = points_[point];
+  p.bend = weight.bend;
   const Eigen::Vector2d pull = weight.slope * residual;
   const Eigen::Matrix<double, 3, 2> Jp = weight.curvature * J.point.transpose();
   p.H.noalias() += Jp * J.point;
@@ -118,21 +119,15 @@ NormalEquations::Step NormalEquations::solve(double damping) const {
   return step;
 }
 
-Eigen::MatrixXd NormalEquations::covariance() const {
-  const Reduced r = reduce(0.0);
-  const Eigen::Index n = r.S.rows();
-  return r.S.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-}
-
-Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& covariance) const {
-  // What is known beside the pictures has the scatter that its information says.
-  Eigen::MatrixXd scatter = H_known_;
+template <class Factor>
+size_t NormalEquations::add_scores(Eigen::MatrixXd& lower, Factor factor) const {
   size_t begin = 0, clusters = 0;
   std::vector<Vector6d> score;
   for (const Point& point : points_) {
     const size_t end = std::max(begin, point.links_end);
     if (end > begin) {
       ++clusters;
+      const double times = factor(point);
       Eigen::Matrix3d H = point.H;
       H.diagonal().array() += kMinPointInformation;
       const Eigen::Vector3d shift = H.ldlt().solve(point.b);
@@ -141,16 +136,30 @@ Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& cov
       for (size_t i = begin; i < end; ++i) score.emplace_back(links_[i].b - links_[i].W * shift);
       for (size_t i = begin; i < end; ++i) {
         const int row = 6 * links_[i].free_view;
-        scatter.block<kLens, 6>(lens_row_, row).noalias() += lens * score[i - begin].transpose();
+        lower.block<kLens, 6>(lens_row_, row).noalias() += times * lens * score[i - begin].transpose();
         for (size_t j = begin; j <= i; ++j) {
-          scatter.block<6, 6>(row, 6 * links_[j].free_view).noalias() +=
-              score[i - begin] * score[j - begin].transpose();
+          lower.block<6, 6>(row, 6 * links_[j].free_view).noalias() +=
+              times * score[i - begin] * score[j - begin].transpose();
         }
       }
-      scatter.block<kLens, kLens>(lens_row_, lens_row_).noalias() += lens * lens.transpose();
+      lower.block<kLens, kLens>(lens_row_, lens_row_).noalias() += times * lens * lens.transpose();
     }
     begin = end;
   }
+  return clusters;
+}
+
+Eigen::MatrixXd NormalEquations::covariance() const {
+  Reduced r = reduce(0.0);
+  add_scores(r.S, [](const Point& point) { return -point.bend; });
+  const Eigen::Index n = r.S.rows();
+  return r.S.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+}
+
+Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& covariance) const {
+  // What is known beside the pictures has the scatter that its information says.
+  Eigen::MatrixXd scatter = H_known_;
+  const size_t clusters = add_scores(scatter, [](const Point&) { return 1.0; });
   // The fit has taken its own share out of the residuals. A track whose errors are all alike still brings two numbers.
   const auto n = 2.0 * static_cast<double>(clusters), unknowns = static_cast<double>(scatter.rows());
   const double shrunk = n > 2.0 * unknowns ? n / (n - unknowns) : 2.0;

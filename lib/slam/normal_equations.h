@@ -19,6 +19,7 @@ class NormalEquations {
   struct Weight {
     double slope = 1.0;
     double curvature = 1.0;
+    double bend = 0.0;  ///< of the whole point's cost, by which its squared score is less in H, (M.13b)
   };
 
   /// One observation, residual and derivatives already divided by sigma; `free_view` is -1 for a fixed one.
@@ -61,6 +62,7 @@ class NormalEquations {
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     MatrixL3d W_lens = MatrixL3d::Zero();
     LensCorrection::Vector b_lens = LensCorrection::Vector::Zero();  ///< its share of the lens's
+    double bend = 0.0;
     size_t links_end = 0;  ///< its links end here, and begin where the point before has its end
   };
   struct Reduced {
@@ -69,6 +71,9 @@ class NormalEquations {
     std::vector<Eigen::Matrix3d> inverse_H;  ///< per point, damped
   };
   [[nodiscard]] Reduced reduce(double damping) const;
+  /// Adds the outer product of every point's score, times `factor(point)`, to a lower triangle; returns their number.
+  template <class Factor>
+  size_t add_scores(Eigen::MatrixXd& lower, Factor factor) const;
 
   int lens_row_;
   Eigen::MatrixXd H_;  ///< of views and lens, lower triangle

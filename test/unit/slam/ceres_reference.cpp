@@ -4,32 +4,52 @@
 #include <ceres/rotation.h>
 
 #include <array>
+#include <cmath>
 
 #include "geometry/so3.h"
 
 namespace roadfix::test {
 namespace {
 
-/// The same residual with Ceres' automatic derivatives: pose as rotation vector and position.
-struct CeresReprojection {
-  SE3 T_map_start;
-  Eigen::Vector3d p_right_left;
-  bool right;
-  Eigen::Vector2d seen;
-  double scale;
+/// The same residuals of a whole track with Ceres' automatic derivatives: first the point, then all poses as position
+/// and rotation vector.
+struct CeresTrack {
+  const BundleProblem& problem;
+  size_t begin, end;  ///< of its observations
 
   template <typename T>
-  bool operator()(const T* pose, const T* point, T* residual) const {
-    const Eigen::Matrix<T, 3, 1> between(point[0] - pose[0], point[1] - pose[1], point[2] - pose[2]);
-    const Eigen::Matrix<T, 3, 1> p_start = T_map_start.R().transpose().cast<T>() * between;
-    const T back[3] = {-pose[3], -pose[4], -pose[5]};
-    T p[3];
-    ceres::AngleAxisRotatePoint(back, p_start.data(), p);
-    if (right) p[0] += T(p_right_left.x());
-    residual[0] = scale * (p[0] / p[2] - seen.x());
-    residual[1] = scale * (p[1] / p[2] - seen.y());
+  bool operator()(T const* const* blocks, T* residual) const {
+    const T* point = blocks[0];
+    for (size_t i = begin; i < end; ++i) {
+      const BundleProblem::Observation& o = problem.observations[i];
+      const T* pose = blocks[1 + o.view];
+      const Eigen::Matrix<T, 3, 1> between(point[0] - pose[0], point[1] - pose[1], point[2] - pose[2]);
+      const Eigen::Matrix3d R = problem.views[static_cast<size_t>(o.view)].T_map_camera.R();
+      const Eigen::Matrix<T, 3, 1> p_start = R.transpose().cast<T>() * between;
+      const T back[3] = {-pose[3], -pose[4], -pose[5]};
+      T p[3];
+      ceres::AngleAxisRotatePoint(back, p_start.data(), p);
+      if (o.right) p[0] += T(problem.T_right_left.p.x());
+      const double scale = problem.focal_px / problem.sigma_px;
+      *residual++ = scale * (p[0] / p[2] - o.normalised.x());
+      *residual++ = scale * (p[1] / p[2] - o.normalised.y());
+    }
     return true;
   }
+};
+
+/// (freedom + numbers) log(1 + s / freedom), twice the cost of a track without Huber's.
+class StudentLoss final : public ceres::LossFunction {
+ public:
+  StudentLoss(double freedom, double numbers) : freedom_(freedom), numbers_(numbers) {}
+  void Evaluate(double s, double rho[3]) const override {
+    rho[0] = (freedom_ + numbers_) * std::log1p(s / freedom_);
+    rho[1] = (freedom_ + numbers_) / (freedom_ + s);
+    rho[2] = -rho[1] / (freedom_ + s);
+  }
+
+ private:
+  double freedom_, numbers_;
 };
 
 }  // namespace
@@ -42,12 +62,20 @@ CeresResult adjust_with_ceres(const BundleProblem& b) {
     poses.push_back({p.x(), p.y(), p.z(), 0.0, 0.0, 0.0});
   }
   ceres::Problem problem;
-  for (const auto& o : b.observations) {
-    const auto v = static_cast<size_t>(o.view);
-    auto* cost = new ceres::AutoDiffCostFunction<CeresReprojection, 2, 6, 3>(new CeresReprojection{
-        b.views[v].T_map_camera, b.T_right_left.p, o.right, o.normalised, b.focal_px / b.sigma_px});
-    problem.AddResidualBlock(cost, new ceres::HuberLoss(b.huber), poses[v].data(),
-                             points[static_cast<size_t>(o.point)].data());
+  for (size_t begin = 0, end = 0; begin < b.observations.size(); begin = end) {
+    while (end < b.observations.size() && b.observations[end].point == b.observations[begin].point) ++end;
+    const auto numbers = 2 * static_cast<int>(end - begin);
+    auto* cost = new ceres::DynamicAutoDiffCostFunction<CeresTrack>(new CeresTrack{b, begin, end});
+    std::vector<double*> blocks{points[static_cast<size_t>(b.observations[begin].point)].data()};
+    cost->AddParameterBlock(3);
+    for (auto& pose : poses) {
+      blocks.push_back(pose.data());
+      cost->AddParameterBlock(6);
+    }
+    cost->SetNumResiduals(numbers);
+    problem.AddResidualBlock(cost, new StudentLoss(b.track_freedom, numbers), blocks);
+  }
+  for (size_t v = 0; v < poses.size(); ++v) {
     if (b.views[v].fixed) problem.SetParameterBlockConstant(poses[v].data());
   }
   ceres::Solver::Options options;
