@@ -192,7 +192,12 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   const FrameMotion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_,
                           seconds_between(start_->t_us, frame.t_us)};
   start_.reset();
-  begin_map(frame.t_us, going, cov_own_);
+  // The mean of what may have been seconds: a car that pulls away is faster at their end.
+  constexpr double kUnseen = 1.5;  // m/s2, as in travel.cpp
+  Matrix6d cov_going = cov_own_;
+  const double slip = 0.5 * kUnseen * going.dt_s * going.dt_s;
+  cov_going.topLeftCorner<3, 3>().diagonal().array() += slip * slip;
+  begin_map(frame.t_us, going, cov_going);
 }
 
 }  // namespace roadfix
