@@ -65,7 +65,7 @@ def malaga_shape_pct(runs):
 
 def nees_lines(runs):
     def run():
-        text = runs.call(runs.program("slam_drives_test"), "the covariance*")
+        text = runs.call(runs.program("slam_drives_test"), "the covariance is*")
         return [float(value) for value in re.findall(r"^nees .*: (\d+\.\d+),", text, re.MULTILINE)]
 
     return runs.once(("nees",), run)

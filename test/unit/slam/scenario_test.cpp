@@ -57,7 +57,7 @@ Course run(const ScenarioConfig& config, uint64_t seed, const TrackConfig& track
 }
 
 TEST_CASE("every lit road is tracked, and what moves on it is left out", "[statistics]") {
-  for (const char* name : {"city_loop", "highway", "car_park", "cold_start_moving", "turn"}) {
+  for (const char* name : {"city_loop", "highway", "car_park", "cold_start_moving", "turn", "demo", "long_city"}) {
     CAPTURE(name);
     const Course c = run(shortened(name, 40.0), 2);
     CHECK(c.tracked >= 0.99 * c.frames);
