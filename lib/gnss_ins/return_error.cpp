@@ -8,10 +8,10 @@ namespace roadfix {
 namespace {
 
 // How long a receiver takes to settle after it has lost all signals is nobody's promise: its loops pull in within a
-// second, its smoothing of codes by carriers (Hatch 1982) and its own filter within some. Prior: 1.2 to 5 s at one
+// second, its smoothing of codes by carriers (Hatch 1982) and its own filter within some. Prior: 0.75 to 8 s at one
 // standard deviation, and the rate may change, so that ten seconds later it can be another by a factor of 2.6.
 constexpr double kFadeTime = 2.5;    // s
-constexpr double kFadeSpread = 0.7;  // of the logarithm
+constexpr double kFadeSpread = 1.2;  // of the logarithm
 constexpr double kRateWalk = 0.3;    // of the logarithm, 1/sqrt(s)
 
 }  // namespace
