@@ -1,5 +1,6 @@
 // A simulated drive through the whole stack, with tracks in place of pictures: the keyframe tracker as vo_tracker runs
-// it (speeds of wheels and INS, restarts of the fusion, 0.5 s late), a hundred times faster than by drawing.
+// it (speeds of wheels and INS, the INS's level, restarts of the fusion, 0.5 s late), a hundred times faster than by
+// drawing.
 //   fusion_tracks SCENARIO SEED LOG VEHICLE OUT
 // LOG and VEHICLE are what `roadfix simulate SCENARIO --seed SEED --no-camera` made; OUT is for `roadfix evaluate`.
 #include <cstdio>
@@ -66,7 +67,9 @@ class TracksStage final : public Stage {
       const auto speed = wheel_speed(wheel_sample(decode<wheels_t>(m.bytes)), calibration_.sensors.wheels);
       if (speed) tracker_->speed(*speed);
     } else if (m.input == 2) {
-      if (const auto speed = ins_speed(odometry(decode<pose_t>(m.bytes)))) tracker_->speed(*speed);
+      const Odometry ins = odometry(decode<pose_t>(m.bytes));
+      if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
+      if (const auto level = ins_level(ins)) tracker_->level(*level);
     } else {
       tracker_->restart(restart(decode<vo_restart_t>(m.bytes)));
     }
