@@ -14,6 +14,7 @@ using namespace fusion;
 namespace {
 
 constexpr double kUnknownPosition = 1e-3;  ///< m: a local frame begins where it begins
+constexpr double kUnknownSpeed = 50.0;     ///< m/s
 constexpr double kShortestDoubt = 0.1;     ///< s
 constexpr double kLongestStep = 0.1;       ///< s, of the motion models; longer silences go in several
 
@@ -157,7 +158,7 @@ void Fusion::start(const ChannelSample& s) {
     height_ = 0.0;
     height_variance_ = kUnknownPosition * kUnknownPosition;
   }
-  set_independent(e, kSpeed, s.odometry.velocity.x(), std::sqrt(s.odometry.cov_velocity(0, 0)) + 0.1);
+  set_independent(e, kSpeed, s.odometry.velocity.x(), kUnknownSpeed);
   set_independent(e, kAccel, 0.0, 2.0);
   set_independent(e, kTurn, s.odometry.angular_rate.z(), 0.1);
   set_independent(e, kVoScale, 0.0, config_.vo_scale_std);
@@ -165,6 +166,11 @@ void Fusion::start(const ChannelSample& s) {
   set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
   for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::sqrt(s.odometry.cov_velocity(0, 0)));
   set_independent(e, kInsDrift, 0.0, ins_drift_std_);
+  // The speed is the channel's: with the error of its scale, or of its velocity, which the next samples have as well.
+  const double own = enu ? 0.0 : s.odometry.cov_velocity(0, 0);
+  if (s.metric)
+    finish_update(e, begin_update(e, told_speed(e.x, slots(s.channel), s.odometry.velocity.x(),
+                                                own + config_.speed_sigma * config_.speed_sigma)));
   for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
   for (Mode& mode : imm_.modes) mode.estimate = e;
   now_ = combine_planar(imm_);

@@ -270,6 +270,30 @@ TEST_CASE("of two that share a gyro the one that knows its bias speaks of the ya
   CHECK(hidden > 0.1);  // teeth
 }
 
+/// A vision drives alone for five seconds; the sigma of its log scale by what `first` says of itself.
+double scale_sigma_alone(double first_sigma) {
+  Tunnel t;
+  t.with_wheels = false;
+  Fusion fusion({});
+  std::vector<StreamEvent> events = t.events();
+  std::erase_if(events, [&](const StreamEvent& e) {
+    return e.sample.channel != FusionChannel::kVo || seconds(t.drive, e.sample.odometry.t_us) > 20.0 ||
+           seconds(t.drive, e.sample.odometry.t_us) < 15.0;  // under way
+  });
+  if (first_sigma > 0.0) {  // somebody else's speed, of which it knows nothing
+    events.front().sample.channel = FusionChannel::kIns;
+    events.front().sample.odometry.cov_velocity = first_sigma * first_sigma * Eigen::Matrix3d::Identity();
+  }
+  run(fusion, events, [](const Fusion&, const StreamEvent&) {});
+  return std::sqrt(fusion.estimate().P(kVoScale, kVoScale));
+}
+
+TEST_CASE("a vision that starts alone does not learn its lengths from its own speed") {
+  const double prior = FusionConfig{}.vo_scale_std;
+  CHECK(scale_sigma_alone(0.0) > 0.97 * prior);
+  CHECK(scale_sigma_alone(0.05) < 0.9 * prior);  // teeth: the speed of an INS does tell
+}
+
 /// In the tunnel a vision drives off from 50 s, tells nothing from 52 s to 53 s, and goes on from there in a new map
 /// (`reset`) whose lengths are wrong by `scaled`; again nothing from 58 s to 59 s.
 struct NewMap {
