@@ -1,6 +1,7 @@
-"""Tests of scripts/figures and scripts/readme-tables, run by CTest with the repository's root as argument."""
+"""Tests of scripts/figures, scripts/readme-tables and scripts/drift, run by CTest with the repository's root as argument."""
 import importlib.machinery
 import importlib.util
+import math
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,32 @@ class Reach(unittest.TestCase):
         reached = load("figures").reached
         for reach in ("<=3", ">=3", "0.8..1.2"):
             self.assertFalse(reached(float("nan"), reach))
+
+
+class Drift(unittest.TestCase):
+    REFERENCE = {0: ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]), 50: ([40.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])}
+
+    def test_what_is_lost_is_told_by_its_name(self):
+        half = math.radians(1.0) / 2.0
+        estimate = dict(self.REFERENCE)
+        estimate[50] = ([40.5, -0.2, 0.0], [0.0, 0.0, math.sin(half), math.cos(half)])
+        roll, pitch, yaw, across, along = load("drift").lost(estimate, self.REFERENCE, 0, 50)
+        self.assertAlmostEqual(yaw, 1.0, places=4)
+        self.assertAlmostEqual(across, -0.2)
+        self.assertAlmostEqual(along, 0.5)
+        self.assertAlmostEqual(abs(roll) + abs(pitch), 0.0)
+
+    def test_the_frame_does_not_matter(self):
+        turn = ([3.0, 4.0, 0.0], [0.0, 0.0, math.sin(0.3), math.cos(0.3)])
+        drift = load("drift")
+        moved = {k: ([a + b for a, b in zip(turn[0], drift.rotated(turn[1], p))], drift.product(turn[1], q))
+                 for k, (p, q) in self.REFERENCE.items()}
+        for value in drift.lost(moved, self.REFERENCE, 0, 50):
+            self.assertAlmostEqual(value, 0.0)
+
+    def test_a_slow_vehicle_is_left_out(self):
+        reference = {0: self.REFERENCE[0], 50: ([10.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])}
+        self.assertIsNone(load("drift").lost(reference, reference, 0, 50))
 
 
 class Measurements(unittest.TestCase):

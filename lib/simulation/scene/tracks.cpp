@@ -53,6 +53,7 @@ struct Track {
   SurfacePoint point;
   Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // px, of a mismatch
   bool mismatched = false;
+  double noise_px = 0.0;
 };
 
 }  // namespace
@@ -113,10 +114,16 @@ struct TrackSimulator::Impl {
     return pixel;
   }
 
-  Eigen::Vector2d noise() {
+  Eigen::Vector2d noise(const Track& track) {
     const double u = random.normal();
     const double v = random.normal();
-    return config.noise_px * Eigen::Vector2d(u, v);
+    return track.noise_px * Eigen::Vector2d(u, v);
+  }
+
+  /// Of a new track.
+  double noise_px() {
+    return config.noise_spread > 0.0 ? config.noise_px * std::exp(config.noise_spread * random.normal())
+                                     : config.noise_px;
   }
 
   std::optional<TrackObservation> observe_one(Track& track, const View& view, const RayWindow& window) {
@@ -131,13 +138,13 @@ struct TrackSimulator::Impl {
     }
     TrackObservation o;
     o.id = track.id;
-    o.left = *pixel + track.offset + noise();
+    o.left = *pixel + track.offset + noise(track);
     o.p_enu = p;
     o.is_outlier = track.mismatched || track.point.mover >= 0;
     if (!left.sees(o.left)) return std::nullopt;
     if (right) {
       const auto other = sees(right->camera, view.T_enu_camera * right->T_left_right, window, p);
-      if (other) o.right = *other + track.offset + noise();
+      if (other) o.right = *other + track.offset + noise(track);
       if (o.right && !right->camera.sees(*o.right)) o.right.reset();
     }
     return o;
@@ -201,6 +208,7 @@ struct TrackSimulator::Impl {
       const auto pixel = left.project(p);
       if (!pixel || !left.sees(*pixel, kBorder_px) || !buckets.take(*pixel)) continue;
       Track track{next_id, point};
+      track.noise_px = noise_px();
       auto o = observe_one(track, view, window);
       if (!o) continue;
       ++next_id;

@@ -18,6 +18,9 @@ namespace roadfix {
 struct TrackConfig {
   int wanted = 200;       ///< tracks alive, as far as the scene gives them
   double noise_px = 0.5;  ///< standard deviation of u and of v, every observation on its own
+  /// Tracks differ: standard deviation of the logarithm of a track's own noise, whose median noise_px is then. Zero:
+  /// all are alike.
+  double noise_spread = 0.0;
   double nearest_m = 1.0;
   double farthest_m = 60.0;
   double loss_per_frame = 0.03;       ///< share of tracks that end though their point is still to be seen

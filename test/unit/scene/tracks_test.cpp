@@ -1,5 +1,7 @@
 // Tracks without pixels: against the pictures of the same world, and by their statistics.
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -146,6 +148,44 @@ TEST_CASE("nothing is found in a dark tunnel") {
   const World lit_world = build_world(lit);
   TrackSimulator lit_tracks(lit_world, quiet(), Camera(test::lens(640, 240)), std::nullopt, 1);
   CHECK(lit_tracks.observe(test::view_at(lit, 150)).size() > 100);
+}
+
+/// Standard deviation of the logarithm of the tracks' own rms errors, and the median of those, px; tracks of 20 numbers
+/// at least, which tell their rms to a sixth.
+std::pair<double, double> spread_of(const TrackConfig& config) {
+  const StreetPlan plan = test::street();
+  const World world = build_world(plan);
+  const Camera camera(test::lens(640, 240));
+  const auto frames = drive(plan, world, config, camera, 120, 7);
+  std::map<std::int64_t, std::pair<double, int>> errors;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const SE3 T_camera_enu = test::view_at(plan, 100 + k).T_enu_camera.inverse();
+    for (const auto& o : frames[k]) {
+      auto& [squares, numbers] = errors[o.id];
+      squares += (o.left - *camera.project(T_camera_enu * o.p_enu)).squaredNorm();
+      numbers += 2;
+    }
+  }
+  std::vector<double> logarithms;
+  for (const auto& [id, error] : errors)
+    if (error.second >= 20) logarithms.push_back(0.5 * std::log(error.first / error.second));
+  REQUIRE(logarithms.size() > 200);
+  double sum = 0.0, squares = 0.0;
+  for (const double x : logarithms) sum += x, squares += x * x;
+  const double mean = sum / static_cast<double>(logarithms.size());
+  std::sort(logarithms.begin(), logarithms.end());
+  return {std::sqrt(squares / static_cast<double>(logarithms.size()) - mean * mean),
+          std::exp(logarithms[logarithms.size() / 2])};
+}
+
+TEST_CASE("tracks differ in their noise as far as was asked for, and not at all where it was not") {
+  TrackConfig config = quiet();
+  config.noise_px = 0.3;
+  CHECK(spread_of(config).first < 0.2);
+  config.noise_spread = 0.9;
+  const auto [spread, median_px] = spread_of(config);
+  CHECK(spread == Approx(0.9).epsilon(0.1));
+  CHECK(median_px == Approx(0.3).epsilon(0.15));
 }
 
 }  // namespace
