@@ -58,7 +58,7 @@ Eigen::Vector3d mechanise(NavState& x, const PaddedRotation& R, const InertialSt
 
   const Eigen::Vector3d v0 = x.velocity;
   const Eigen::Vector3d earth_turn = earth.rate() * dt;
-  const Eigen::Vector3d dv_enu = R.topRows<3>().lazyProduct(dv_start);
+  Eigen::Vector3d dv_enu = R.topRows<3>().lazyProduct(dv_start);
   const Eigen::Vector3d forces = earth.gravity(x.position) * dt;
   // (M.5): the frame turns by earth_turn during the step, half of it seen by the mean specific force.
   const Eigen::Vector3d v_mid = v0 + 0.5 * (dv_enu + forces);

@@ -85,7 +85,7 @@ std::optional<Eigen::Vector3d> LocalMap::locate(const Landmark& landmark) const 
   }
   const bool stereo = landmark.sightings.back().right.has_value();
   const double angle = stereo ? config_.min_disparity_px / focal_px_ : config_.min_parallax_deg * kDegree;
-  const auto p = triangulate(rays, angle);
+  auto p = triangulate(rays, angle);
   if (!p || worst_error_px(landmark, *p) > config_.gate_px) return std::nullopt;
   return p;
 }

@@ -106,7 +106,7 @@ WheelCovariance transition(const WheelVector& x, const WheelStep& step) {
 }
 
 Eigen::Vector3d plumb_force(const WheelVector& x, const PlumbLine& plumb) {
-  const Eigen::Vector3d force = plumb.force - Eigen::Vector3d(x(kAccelBias), x(kAccelBias + 1), 0.0);
+  Eigen::Vector3d force = plumb.force - Eigen::Vector3d(x(kAccelBias), x(kAccelBias + 1), 0.0);
   if (!plumb.correct_acceleration) return force;
   return force - wheel_acceleration(x(kSpeed), plumb.speed_rate, body_rate(x, plumb.gyro));
 }

@@ -160,7 +160,7 @@ void WheelOdometry::start(const Tilt& tilt, double tilt_sigma) {
   started_ = true;
 }
 
-void WheelOdometry::step(int64_t t_us, WheelStep next, const WheelNoise& noise) {
+void WheelOdometry::step(int64_t t_us, const WheelStep& next, const WheelNoise& noise) {
   propagate(state_, next, noise);
   t_us_ = t_us;
 }

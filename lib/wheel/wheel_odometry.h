@@ -83,7 +83,7 @@ class WheelOdometry {
 
   WheelInputStatus align(const ImuSample& imu);
   void start(const Tilt& tilt, double tilt_sigma);
-  void step(int64_t t_us, WheelStep step, const WheelNoise& noise);
+  void step(int64_t t_us, const WheelStep& step, const WheelNoise& noise);
   void step_blind(int64_t t_us, double acceleration);
   void learn_bias(const WheelStep& step);
   void gather_plumb(const ImuSample& imu, double dt_s);

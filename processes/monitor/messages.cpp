@@ -88,8 +88,8 @@ HeartbeatFacts heartbeat_facts(const heartbeat_t& m) {
 }
 
 std::string source_name(const std::string& channel, int8_t source) {
-  const auto i = static_cast<std::size_t>(source);
-  const std::string name = source >= 0 && i < kSources.size() ? kSources[i] : "Unknown source";
+  const auto i = static_cast<uint8_t>(source);  // a negative one lies beyond the last
+  const std::string name = i < kSources.size() ? kSources[i] : "Unknown source";
   const std::size_t underscore = channel.find('_');
   return name + " in " + (underscore == std::string::npos ? channel : channel.substr(underscore + 1));
 }

@@ -121,7 +121,7 @@ void put_estimate(Page& page, const HealthReport& report, int columns) {
                                           pose.position_std, pose.yaw_std / kDegree);
     const std::string rest = fmt::format(" {:.0f} km/h; this verdict for {}", pose.speed * 3.6, since);
     const bool fits = static_cast<int>(place.size() + rest.size()) < columns;
-    page.line(fits ? place + "," + rest : place);
+    page.line(fits ? fmt::format("{},{}", place, rest) : place);
     if (!fits) page.line(rest);
     return;
   }

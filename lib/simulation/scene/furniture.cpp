@@ -6,7 +6,6 @@ namespace roadfix {
 namespace {
 
 const Look kPost{Material::kMetal, Pattern::kCourses, 0.7F, 1.0F, 0.5F};
-const Look kBody{Material::kCarBody};
 
 /// A rectangle in a car's own axes.
 void car_rectangle(std::vector<Face>& faces, const Eigen::Vector3d& corner, const Eigen::Vector3d& a,

@@ -30,7 +30,7 @@ std::vector<Eigen::Vector3d> resample(const std::vector<Eigen::Vector3d>& driven
     const Eigen::Vector3d step = driven[i + 1] - driven[i];
     const double length = step.norm();
     for (double at = points.empty() ? 0.0 : 1.0 - left_over; at <= length; at += 1.0) {
-      points.push_back(driven[i] + step * (length > 0.0 ? at / length : 0.0));
+      points.emplace_back(driven[i] + step * (length > 0.0 ? at / length : 0.0));
       left_over = -at;
     }
     left_over += length;

@@ -109,7 +109,7 @@ struct TrackSimulator::Impl {
                                                     const RayWindow& window, const Eigen::Vector3d& p_enu) const {
     const Eigen::Vector3d p = T_enu_camera.q.conjugate() * (p_enu - T_enu_camera.p);
     if (p.z() < config.nearest_m || p.z() > config.farthest_m) return std::nullopt;
-    const auto pixel = camera.project(p);
+    auto pixel = camera.project(p);
     if (!pixel || !camera.sees(*pixel, kBorder_px) || window.occluded(T_enu_camera.p, p_enu)) return std::nullopt;
     return pixel;
   }

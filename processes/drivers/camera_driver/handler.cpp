@@ -66,7 +66,7 @@ bool fill(std::span<const uint8_t> bytes, const CameraDriverConfig& config, imag
 CameraDriver::CameraDriver(const CameraDriverConfig& config) : config_(config) {
   for (std::size_t i = 0; i < config.devices.size(); ++i) {
     counters_.emplace_back().name = config.channels[i];
-    opened(static_cast<int>(i));
+    CameraDriver::opened(static_cast<int>(i));
   }
 }
 

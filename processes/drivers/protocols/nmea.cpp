@@ -124,7 +124,7 @@ std::optional<int64_t> nmea_time_of_day_us(std::string_view text) {
   if (text.size() < kWholeDigits || !digits(text.substr(0, kWholeDigits))) return std::nullopt;
   const auto hours = whole(text.substr(0, 2)), minutes = whole(text.substr(2, 2)), seconds = whole(text.substr(4, 2));
   if (*hours > 23 || *minutes > 59 || *seconds > 60) return std::nullopt;
-  int64_t t_us = (int64_t{*hours} * 3600 + *minutes * 60 + *seconds) * 1'000'000;
+  int64_t t_us = (int64_t{*hours} * 3600 + int64_t{*minutes} * 60 + *seconds) * 1'000'000;
   if (text.size() == kWholeDigits) return t_us;
   const auto fraction = number(text.substr(kWholeDigits));
   if (text[kWholeDigits] != '.' || !fraction) return std::nullopt;

@@ -11,7 +11,7 @@ std::optional<int64_t> utc_us(int year, int month, int day, int hour, int minute
                                          std::chrono::day(static_cast<unsigned>(day))};
   if (!date.ok()) return std::nullopt;
   const int64_t days = std::chrono::sys_days(date).time_since_epoch().count();
-  return days * kMicrosPerDay + (int64_t{hour} * 3600 + minute * 60 + second) * 1'000'000;
+  return days * kMicrosPerDay + (int64_t{hour} * 3600 + int64_t{minute} * 60 + second) * 1'000'000;
 }
 
 int64_t nearest_day(int64_t time_of_day_us, int64_t near_us) {

@@ -4,7 +4,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr std::size_t kHead = 54, kPalette = 4 * 256;
+constexpr std::size_t kHead = 54, kPalette = std::size_t{4} * 256;
 
 void put(std::vector<uint8_t>& out, std::size_t at, uint32_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) out[at + static_cast<std::size_t>(i)] = static_cast<uint8_t>(value >> (8 * i));

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstring>
 #include <vector>
 
 #include "monitor/web/request.h"
@@ -184,7 +183,7 @@ class DashboardServer::Connections {
       stream.sent = 0;
     }
     const std::size_t size = std::min(room, stream.text.size() - stream.sent);
-    std::memcpy(buffer, stream.text.data() + stream.sent, size);
+    std::copy_n(stream.text.data() + stream.sent, size, buffer);
     stream.sent += size;
     return static_cast<ssize_t>(size);
   }
