@@ -10,7 +10,7 @@ namespace roadfix {
 namespace {
 
 const CameraIntrinsics kLens{800, 300, 460.0, 460.0, 400.0, 130.0, Distortion::kNone, {}};
-constexpr int kLit = 24, kDark = 10;
+constexpr int kLit = 76, kDark = 10;
 constexpr double kStep = 0.8;  // m a frame, straight ahead
 
 const cv::Mat& picture(int frame) {
@@ -32,14 +32,18 @@ struct FoundBack {
   TrackState state = TrackState::kLost;  ///< the first one with a pose
   double error = 0.0;                    ///< m, of that pose
   int resets = 0;
+  int loops = 0;              ///< closed since
+  double closed_error = 0.0;  ///< m, at the end, with loops closed
 };
 
-/// So many frames by wheels and pictures, a second of darkness, and the street again from frame `again` on.
-FoundBack after_darkness(int lit, int again) {
+/// So many frames by wheels and pictures, a second of darkness, and the street again from frame `again` to `end`.
+FoundBack after_darkness(int lit, int again, int end) {
   CameraRig rig;
   rig.left = kLens;
+  KeyframeTrackerConfig config;
+  config.keyframe_flow_px = 5.0;  // places close together
   InlineExecutor executor;
-  KeyframeTracker tracker({}, rig, make_front_end({}), executor);
+  KeyframeTracker tracker(config, rig, make_front_end({}), executor);
   int64_t t_us = 0;
   const auto show = [&](const cv::Mat& left) {
     t_us += 100'000;
@@ -50,16 +54,22 @@ FoundBack after_darkness(int lit, int again) {
   CHECK(tracker.last().state == TrackState::kGood);
   for (int i = 0; i < kDark; ++i) (void)show(cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1));
   CHECK(tracker.last().state == TrackState::kLost);
-  for (int i = again; i < kLit; ++i) {
+  FoundBack result;
+  for (int i = again; i < end; ++i) {
     const TrackedFrame out = show(picture(i));
     if (out.odometry.validity == Validity::kInvalid) continue;
-    return {out.state, std::abs(out.odometry.T_frame_vehicle.p.z() - kStep * i), out.reset_counter};
+    const auto off = [i](const Odometry& o) { return std::abs(o.T_frame_vehicle.p.z() - kStep * i); };
+    if (result.state == TrackState::kLost) {
+      result = {out.state, off(out.odometry), out.reset_counter, 0, 0.0};
+    }
+    result.loops = out.num_loops;
+    result.closed_error = off(tracker.closed(out.odometry));
   }
-  return {};
+  return result;
 }
 
 TEST_CASE("mono finds a known place again where it can have come to it, and says so") {
-  const FoundBack near = after_darkness(14, 6), far = after_darkness(24, 6);  // 6 m and 14 m back
+  const FoundBack near = after_darkness(14, 6, 10), far = after_darkness(24, 6, 10);  // 6 m and 14 m back
   std::printf("mono after the dark: %.2f m off at a place nearby, %.2f m at one out of reach\n", near.error, far.error);
   CHECK(near.state == TrackState::kRelocalised);
   CHECK(near.resets == 1);
@@ -67,6 +77,16 @@ TEST_CASE("mono finds a known place again where it can have come to it, and says
   CHECK(far.state == TrackState::kGood);  // begun anew where sight was lost
   CHECK(far.resets == 1);
   CHECK(far.error > 10.0);
+}
+
+TEST_CASE("a loop over a way that nobody saw puts the whole error there, not on the way that was seen") {
+  const FoundBack back = after_darkness(kLit, 2, 24);  // 59 m back: out of reach, so a map of its own
+  std::printf("mono after the dark, 59 m back: %.2f m off, %d loops closed, then %.2f m\n", back.error, back.loops,
+              back.closed_error);
+  CHECK(back.state == TrackState::kGood);
+  CHECK(back.error > 50.0);  // teeth: what the loop has to mend
+  CHECK(back.loops > 0);
+  CHECK(back.closed_error < 1.0);
 }
 
 }  // namespace
