@@ -43,7 +43,7 @@ struct KeyframeTrackerConfig {
   // Keyframes.
   double keyframe_flow_px = 20.0;    ///< mean motion of tracks since the last keyframe that asks for a new one
   double keyframe_min_share = 0.75;  ///< share of its landmarks still in view below which a new one is made
-  double standing_flow_px = 0.6;     ///< median motion below which the camera stands still
+  double standing_flow_px = 0.6;     ///< median motion below which the camera stands still; zero: it never does
   int window = 8;                    ///< keyframes that bundle adjustment moves
   int window_fixed = 3;              ///< older ones that hold them
   int bundle_iterations = 6;         ///< at most

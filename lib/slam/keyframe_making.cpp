@@ -1,6 +1,7 @@
 /// Keyframes: when one is made, what is taken into the map with it, and its adjustment, begun here and taken in before
 /// the next frame. And what holds the pose at a standstill that has left the map without landmarks.
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr double kStandingShare = 0.4;   ///< of a keyframe's landmarks, below which one is made at a standstill too
 constexpr double kFoundMemory = 0.8;     ///< how much of the share found after keyframes stays from one to the next
+constexpr double kNoiseFlow = 1.67;      ///< sigmas: Rayleigh's median times root 2, a flow that is noise alone
 constexpr double kStandingDepth = 10.0;  ///< m, of what is seen: how far a car may have crept by so little flow
 
 }  // namespace
@@ -61,8 +63,10 @@ bool KeyframeTracker::hold(const CameraFrame& frame, const std::vector<Feature>&
   const bool few = static_cast<int>(flows.size()) < 2 * config_.weak_inliers;
   const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
   std::nth_element(flows.begin(), middle, flows.end());
-  if (*middle >= config_.standing_flow_px) return false;
-  const double turn = config_.standing_flow_px / left_.focal(), way = kStandingDepth * turn;
+  const bool known = config_.standing_flow_px > 0.0;
+  const double still_px = known ? std::hypot(config_.standing_flow_px, kNoiseFlow * config_.sigma_px) : 0.0;
+  if (*middle >= still_px) return false;
+  const double turn = still_px / left_.focal(), way = kStandingDepth * turn;
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(way * way), Eigen::Vector3d::Constant(turn * turn);
   out_.state = TrackState::kWeak;

@@ -287,8 +287,9 @@ TEST_CASE("half an hour keeps memory bounded", "[statistics]") {
         stereo ? "stereo" : "mono", half.valid, half.frames, mb(half.states[1]), mb(half.states.back()),
         mb(half.residents.back()) - mb(half.residents[1]));
     CHECK(half.frames > 7500);
-    // These tracks die of old age where the car waits at a light, and mono gets no new points there.
-    CHECK(half.valid > (stereo ? 0.99 : 0.9) * half.frames);
+    // These tracks die of old age where the car waits at a light, and mono gets no new points there: it stands where it
+    // stood, is lost when it pulls away, and begins anew within a second.
+    CHECK(half.valid > (stereo ? 0.99 : 0.96) * half.frames);
     CHECK(10 * half.states.back() < 12 * *std::max_element(half.states.begin(), half.states.begin() + 3));
     CHECK(mb(half.residents.back()) < mb(half.residents[1]) + 10.0);
   }
