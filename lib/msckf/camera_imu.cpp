@@ -119,10 +119,7 @@ std::optional<Fit> fit_at(const std::vector<ViewPair>& pairs, const Samples& sam
       M += weight[i] / (kRateStd * kRateStd) * (rates[i].imu - mean_imu) * (rates[i].camera - mean_camera).transpose();
       M += of_direction[i] * forward * rates[i].pair->direction.transpose();
     }
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Matrix3d U = svd.matrixU();
-    if ((U * svd.matrixV().transpose()).determinant() < 0.0) U.col(2) *= -1.0;
-    const Eigen::Matrix3d R = U * svd.matrixV().transpose();
+    const Eigen::Matrix3d R = wahba_rotation(M);
     fit.q = Eigen::Quaterniond(R).normalized();
     bias = mean_imu - R * mean_camera;
     for (size_t i = 0; i < rates.size(); ++i) {
@@ -207,6 +204,13 @@ std::optional<ViewPair> view_pair(const SeenFrame& before, const SeenFrame& now)
   pair.direction_certainty = std::max(0.0, smallest) / (kNoise_px * kNoise_px);
   pair.points = static_cast<int>(matches.size());
   return pair;
+}
+
+Eigen::Matrix3d wahba_rotation(const Eigen::Matrix3d& M) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d U = svd.matrixU();
+  if ((U * svd.matrixV().transpose()).determinant() < 0.0) U.col(2) *= -1.0;
+  return U * svd.matrixV().transpose();
 }
 
 std::optional<CameraImuCalibration> calibrate_camera_imu(std::span<const SeenFrame> frames,

@@ -22,6 +22,9 @@ struct ViewPair {
 /// Turn and direction by Gauss-Newton on the epipolar distances with Cauchy weights; nothing with too few points.
 std::optional<ViewPair> view_pair(const SeenFrame& before, const SeenFrame& now);
 
+/// The rotation R with the largest tr(R' M).
+Eigen::Matrix3d wahba_rotation(const Eigen::Matrix3d& M);
+
 struct CameraImuCalibration {
   Eigen::Quaterniond q_imu_camera = Eigen::Quaterniond::Identity();
   double time_offset = 0.0;      ///< s: imu time = stamp + this

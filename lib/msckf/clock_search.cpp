@@ -11,10 +11,10 @@ constexpr double kKnown_s = 0.03;   // standard deviation, below which the filte
 constexpr double kSigmas = 3.0;     // of the calibration's, searched, and
 constexpr double kBeside_s = 0.05;  // beyond: a minimum has two sides
 constexpr double kStep_s = 0.01;
-constexpr double kMemory_s = 20.0;  // of pictures and gyro: the longest turn, and straight road on both sides
-constexpr double kMaxPair_s = 0.5;  // between two pictures
-constexpr double kRateStd = 0.01;   // rad/s, beyond twice of which a rate counts less
-constexpr int kRounds = 3;          // of reweighting the gyro's bias
+constexpr double kMaxPair_s = 0.5;   // between two pictures
+constexpr double kRateStd = 0.01;    // rad/s, beyond twice of which a rate counts less
+constexpr int kRounds = 6;           // of reweighting the gyro's bias and the camera's turn
+constexpr double kLeastTurn = 1e-4;  // rad, of the camera in the imu
 constexpr size_t kLeastTurns = 30;
 constexpr double kLeastTurning = 0.05;  // rad/s, root mean square
 constexpr int kEvery = 5;               // pictures between two searches
@@ -32,6 +32,7 @@ ClockSearch::ClockSearch(const MsckfVehicle& vehicle)
       middle_(vehicle.time_offset),
       reach_(kSigmas * vehicle.time_offset_std + kBeside_s),
       sigma_(vehicle.time_offset_std),
+      camera_turn_std_(vehicle.camera_turn_std),
       searching_(vehicle.time_offset_std > kKnown_s) {}
 
 void ClockSearch::add(const ImuSample& imu) {
@@ -52,33 +53,44 @@ Eigen::Vector3d ClockSearch::angle_at(int64_t t_us) const {
 
 ClockSearch::Fit ClockSearch::fit(double offset, size_t begin, size_t end) const {
   const int64_t offset_us = micros(offset);
-  std::vector<Eigen::Vector3d> imu, gap;
+  std::vector<Eigen::Vector3d> imu, cam;
   for (size_t i = begin; i < end; ++i) {
     const Turn& t = turns_[i];
     imu.emplace_back((angle_at(t.to_us + offset_us) - angle_at(t.from_us + offset_us)) /
                      seconds_between(t.from_us, t.to_us));
-    gap.emplace_back(imu.back() - t.rate);
+    cam.emplace_back(t.rate);
   }
   const auto weight = [](double square) { return 1.0 / (1.0 + square / (4.0 * kRateStd * kRateStd)); };
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  // of the camera, against how the calibration says that it sits
+  const double known = std::pow(kRateStd / std::max(camera_turn_std_, kLeastTurn), 2);
   for (int round = 0; round < kRounds; ++round) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Vector3d mean_imu = Eigen::Vector3d::Zero(), mean_cam = Eigen::Vector3d::Zero();
     double weights = 0.0;
-    for (const Eigen::Vector3d& g : gap) {
-      const double w = weight((g - bias).squaredNorm());
-      sum += w * g;
+    for (size_t i = 0; i < imu.size(); ++i) {
+      const double w = weight((imu[i] - R * cam[i] - bias).squaredNorm());
+      mean_imu += w * imu[i];
+      mean_cam += w * cam[i];
       weights += w;
     }
-    bias = sum / weights;
+    mean_imu /= weights;
+    mean_cam /= weights;
+    Eigen::Matrix3d M = known * Eigen::Matrix3d::Identity();
+    for (size_t i = 0; i < imu.size(); ++i) {
+      const double w = weight((imu[i] - R * cam[i] - bias).squaredNorm());
+      M += w * (imu[i] - mean_imu) * (cam[i] - mean_cam).transpose();
+    }
+    R = wahba_rotation(M);
+    bias = mean_imu - R * mean_cam;
   }
   Fit out;
   double weights = 0.0, bends = 0.0;
-  for (size_t i = 0; i < gap.size(); ++i) {
-    const double square = (gap[i] - bias).squaredNorm(), w = weight(square);
+  for (size_t i = 0; i < imu.size(); ++i) {
+    const double square = (imu[i] - R * cam[i] - bias).squaredNorm(), w = weight(square);
     out.cost += std::log1p(square / (4.0 * kRateStd * kRateStd));
     out.square += w * square;
     weights += w;
-    if (i == 0 || i + 1 == gap.size()) continue;
+    if (i == 0 || i + 1 == imu.size()) continue;
     const double dt = seconds_between(turns_[begin + i - 1].from_us, turns_[begin + i + 1].from_us);
     bends += w * ((imu[i + 1] - imu[i - 1]) / dt).squaredNorm();
   }

@@ -16,9 +16,11 @@ class ClockSearch {
     double offset = 0.0, sigma = 0.0;  ///< s: imu time = stamp + this
   };
 
+  static constexpr double kMemory_s = 20.0;  ///< of pictures and gyro: the longest turn, and road on both sides
+
   explicit ClockSearch(const MsckfVehicle& vehicle);
 
-  /// Until then a picture's moment is not known, and every picture's is in doubt by sigma().
+  /// Until then a picture's moment is not known.
   [[nodiscard]] bool searching() const { return searching_; }
   [[nodiscard]] double sigma() const { return sigma_; }
 
@@ -48,7 +50,7 @@ class ClockSearch {
 
   Eigen::Matrix3d R_imu_camera_;
   double middle_, reach_;  ///< s, of the search
-  double sigma_;
+  double sigma_, camera_turn_std_;
   bool searching_;
   std::deque<Angle> angles_;
   std::deque<Turn> turns_;

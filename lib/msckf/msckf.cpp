@@ -52,12 +52,17 @@ void Msckf::add(const SeenFrame& frame) {
 
 void Msckf::settle_clock(const ClockSearch::Found& found) {
   state_.camera.time_offset = found.offset;
-  planned_.reset();
-  if (phase_ != MsckfPhase::kRunning) return;
-  state_.forget(kTimeOffset, found.sigma);
-  while (!state_.landmarks.empty()) state_.remove_landmark(state_.landmarks.front().track);
-  while (!state_.clones.empty()) state_.remove_clone(state_.clones.front().id);
-  tracks_.clear();
+  const std::deque<ImuSample> waited = std::move(imu_);
+  imu_.clear();
+  for (const ImuSample& s : waited) take(s);
+}
+
+void Msckf::wait_for_clock(int64_t now_us) {
+  reason_ = "the camera's clock is not yet known";
+  const int64_t oldest_us = now_us - micros(ClockSearch::kMemory_s);
+  while (imu_.front().t_us < oldest_us) imu_.pop_front();
+  while (!frames_.empty() && frames_.front().t_us < oldest_us) frames_.pop_front();
+  while (!wheels_.empty() && wheels_.front().t_us < oldest_us) wheels_.pop_front();
 }
 
 void Msckf::add(const WheelSample& wheels) {
@@ -73,19 +78,28 @@ int64_t Msckf::picture_us(const SeenFrame& frame) const { return frame.t_us + mi
 bool Msckf::advance(const ImuSample& imu) {
   if (!imu.gyro.allFinite() || !imu.accel.allFinite()) return false;
   if (!imu_.empty() && imu.t_us <= imu_.back().t_us) return false;
+  clock_.add(imu);
+  if (clock_.searching()) {
+    imu_.push_back(imu);
+    wait_for_clock(imu.t_us);
+  } else {
+    take(imu);
+  }
+  return true;
+}
+
+void Msckf::take(const ImuSample& imu) {
   const double dt = imu_.empty() ? 0.0 : seconds_between(imu_.back().t_us, imu.t_us);
   if (dt > kMaxGap_s) {
     planned_.reset();
     if (phase_ == MsckfPhase::kRunning) lose("gap in the imu samples");
   }
   if (dt > 0.0 && dt <= kMaxGap_s) standing_.add(imu, dt);
-  clock_.add(imu);
   imu_.push_back(imu);
   follow(imu.t_us - lag_us_);
   const int64_t needed_us = phase_ == MsckfPhase::kRunning ? std::min(state_.imu.t_us, imu.t_us - micros(kKept_s))
                                                            : imu.t_us - micros(kMemory_s);
   while (imu_.size() > 2 && imu_[1].t_us <= needed_us) imu_.pop_front();
-  return true;
 }
 
 void Msckf::follow(int64_t until_us) {
@@ -211,7 +225,7 @@ void Msckf::use_picture(const SeenFrame& frame) {
                                            [](const ImuSample& s, int64_t t) { return s.t_us < t; });
   const double jitter =
       config_.vehicle.camera_rate > 0.0 ? kLineRest * config_.vehicle.stamp_jitter : config_.vehicle.stamp_jitter;
-  state_.add_clone(id, state_.imu.rate(now.gyro), clock_.searching() ? std::hypot(jitter, clock_.sigma()) : jitter);
+  state_.add_clone(id, state_.imu.rate(now.gyro), jitter);
   points_.clear_counts();
   if (!points_.use_landmarks(state_, frame)) return lose("the filter broke");
   tracks_.add(frame, id);

@@ -100,9 +100,7 @@ class Msckf {
   /// Nothing before the first start.
   [[nodiscard]] const msckf::State* state() const { return phase_ == MsckfPhase::kRunning ? &state_ : nullptr; }
   /// s, standard deviation of the camera's time offset.
-  [[nodiscard]] double time_offset_std() const {
-    return clock_.searching() ? clock_.sigma() : std::sqrt(state_.P()(msckf::kTimeOffset, msckf::kTimeOffset));
-  }
+  [[nodiscard]] double time_offset_std() const { return std::sqrt(state_.P()(msckf::kTimeOffset, msckf::kTimeOffset)); }
   [[nodiscard]] const msckf::PointCounts& counts() const { return points_.counts(); }
   [[nodiscard]] const MsckfConfig& config() const { return config_; }
 
@@ -121,7 +119,11 @@ class Msckf {
   void use(const WheelSample& wheels);
   void use_picture(const msckf::SeenFrame& frame);
   void use_tracks(bool window_full);
-  /// The camera's clock is known from now on; what was seen before was seen at another moment than it was taken for.
+  /// The next imu sample, its camera's clock known.
+  void take(const ImuSample& imu);
+  /// Keeps what the clock's search keeps, up to now.
+  void wait_for_clock(int64_t now_us);
+  /// The camera's clock is known from now on: what has waited for it is gone through, (M.47).
   void settle_clock(const msckf::ClockSearch::Found& found);
   void use_vehicle(const WheelSample* wheels);
   void use_standing();

@@ -30,7 +30,7 @@ bool Msckf::restart(const MsckfRestart& r) {
   Matrix6d cov = 0.5 * (r.cov_pose + r.cov_pose.transpose());
   cov.diagonal().array() += kPlaceStd * kPlaceStd;
   cov.diagonal().segment<2>(3).array() += kLevellingStd * kLevellingStd;
-  if (!usable(r, cov) || imu_.empty() || imu_.back().t_us < r.t_us) return false;
+  if (clock_.searching() || !usable(r, cov) || imu_.empty() || imu_.back().t_us < r.t_us) return false;
   // From the pose's moment on, or from where the samples have no gap any more.
   int64_t from_us = std::max(r.t_us, imu_.front().t_us);
   for (size_t i = 1; i < imu_.size(); ++i)

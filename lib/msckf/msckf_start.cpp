@@ -68,7 +68,7 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   set(kAccelScale, 3, c.scale_std);
   set(kCameraTurn, 3, c.camera_turn_std);
   set(kCameraPlace, 3, c.camera_std);
-  set(kTimeOffset, 1, clock_.searching() ? 0.0 : clock_.sigma());  // (M.47)
+  set(kTimeOffset, 1, clock_.sigma());
   set(kWheelScale, 1, c.wheel_scale_std);
   set(kMounting, 2, c.mounting_std);
   // Levelling by a biased accelerometer: phi = (-b_y, b_x, 0) / g in local axes, (M.31).

@@ -105,12 +105,6 @@ void State::erase(int at, int width) {
   for (Landmark& l : landmarks) moved(l.at);
 }
 
-void State::forget(int at, double sigma) {
-  P_.row(at).head(size_).setZero();
-  P_.col(at).head(size_).setZero();
-  P_(at, at) = sigma * sigma;
-}
-
 void State::remove_clone(int64_t id) {
   const auto found = std::find_if(clones.begin(), clones.end(), [&](const Clone& c) { return c.id == id; });
   const int at = found->at;

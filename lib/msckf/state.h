@@ -123,8 +123,6 @@ class State {
   /// Room for a block of `width` at the end, its rows and columns zero; its first index.
   int grow(int width);
   void remove_clone(int64_t id);
-  /// One number of the base is known anew, from elsewhere.
-  void forget(int at, double sigma);
   void remove_landmark(int64_t track);
 
   /// Copies the pose as it is now, `rate` rad/s in imu axes; stamps jitter by `jitter` s, (M.12).
