@@ -37,13 +37,13 @@ Fusion::Fusion(const FusionConfig& config) : config_(config) {}
 ChannelSlots Fusion::slots(FusionChannel c) {
   switch (c) {
     case FusionChannel::kVo:
-      return {kVoClone, kVoScale, kVoDrift, std::nullopt};
+      return {kVoClone, kVoScale, kVoTurns, std::nullopt, std::nullopt};
     case FusionChannel::kWheel:
-      return {kWheelClone, kWheelScale, std::nullopt, std::nullopt};
+      return {kWheelClone, kWheelScale, std::nullopt, std::nullopt, std::nullopt};
     case FusionChannel::kIns:
       break;
   }
-  return {kInsClone, std::nullopt, kInsDrift, kInsVelocity};
+  return {kInsClone, std::nullopt, std::nullopt, kInsDrift, kInsVelocity};
 }
 
 double Fusion::timeout(FusionChannel c) const {
@@ -162,7 +162,7 @@ void Fusion::start(const ChannelSample& s) {
   set_independent(e, kAccel, 0.0, 2.0);
   set_independent(e, kTurn, s.odometry.angular_rate.z(), 0.1);
   set_independent(e, kVoScale, 0.0, config_.vo_scale_std);
-  set_independent(e, kVoDrift, 0.0, config_.vo_drift_std);
+  set_independent(e, kVoTurns, 0.0, config_.vo_turns_std);
   set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
   for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::sqrt(s.odometry.cov_velocity(0, 0)));
   set_independent(e, kInsDrift, 0.0, ins_drift_std_);

@@ -76,6 +76,8 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   const double length = s.scale ? std::exp(-x(*s.scale)) : 1.0;
   Planar way = told ? a.way : Planar::Zero();
   way.head<2>() *= length;
+  const double turns = s.turns ? std::exp(-x(*s.turns)) : 1.0;
+  way.z() *= turns;
   if (s.drift) way.z() -= x(*s.drift) * heard;
   const Planar start = f.planar.pose;
   const double silent_yaw = start.z() + way.z();
@@ -86,6 +88,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   F.block<2, 1>(0, kSpeed) = silent * Eigen::Vector2d(std::cos(silent_yaw), std::sin(silent_yaw));
   F(2, kTurn) = silent;
   if (s.scale) F.block<2, 1>(0, *s.scale) = -told_way;
+  if (s.turns) F(2, *s.turns) = -way.z();
   if (s.drift) F(2, *s.drift) = -heard;
   if (s.velocity) F.block<2, 2>(0, *s.velocity) = -heard * Eigen::Matrix2d::Identity();
   if (told && silent <= 0.0) {
@@ -96,7 +99,7 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
       f.speed -= along.dot(x.segment<2>(*s.velocity));
       F.block<1, 2>(3, *s.velocity) = -along;
     }
-    f.turn = a.view.turn - (s.drift ? x(*s.drift) : 0.0);
+    f.turn = turns * a.view.turn - (s.drift ? x(*s.drift) : 0.0);
   } else {
     F(3, kSpeed) = 1.0;
   }

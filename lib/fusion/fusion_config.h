@@ -37,12 +37,12 @@ struct FusionConfig {
   double turn_sigma = 0.01;         ///< rad/s, of a yaw rate as it is measured
   double speed_sigma = 0.05;        ///< m/s, white error of a speed, beside what the channel says of it
   MotionFloor ins_floor{0.002, 0.0, 0.0, 2e-5};
-  MotionFloor vo_floor{0.005, 0.005, 0.002, 2e-4};  ///< stereo sees the way less sharply than its direction
+  MotionFloor vo_floor{0.005, 0.005, 0.002, 1e-4};  ///< stereo sees the way less sharply than its direction
   MotionFloor wheel_floor{0.01, 0.003, 0.003, 5e-4};
   double vo_jitter = 0.005;     ///< m, white error of one picture's place
   double vo_yaw_jitter = 2e-4;  ///< rad, likewise
   double vo_scale_std = 0.03;   ///< before GNSS has shown it
-  double vo_drift_std = 1e-4;   ///< rad/s
+  double vo_turns_std = 0.003;  ///< share of its turns: the focal length (slam's M.22), a gyro's scale
   double wheel_scale_std = 0.01;
   double least_gain = 0.01;       ///< share of variance that an absolute pose must take away to be used
   double gate = 16.3;             ///< squared Mahalanobis distance, 99.9 % of 3 degrees of freedom
@@ -72,7 +72,7 @@ void visit(FusionConfig& c, Visitor& v) {
   v.number("vo_jitter_m", c.vo_jitter, 0.0, 10.0);
   v.number("vo_yaw_jitter_rad", c.vo_yaw_jitter, 0.0, 1.0);
   v.number("vo_scale_std", c.vo_scale_std, 0.0, 1.0);
-  v.number("vo_drift_std_radps", c.vo_drift_std, 0.0, 1.0);
+  v.number("vo_turns_std", c.vo_turns_std, 0.0, 1.0);
   v.number("wheel_scale_std", c.wheel_scale_std, 0.0, 1.0);
   v.number("least_gain", c.least_gain, 0.001, 0.999);
   v.number("gate", c.gate, 0.1, 1e9);

@@ -129,9 +129,8 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
 
   if (ins) follow_ins_errors(s.odometry, dt, false);
   Eigen::Matrix3d R = motion_noise(m, s, view, motion, dt);
-  const int drift = ins ? kInsDrift : kVoDrift;
   m.yaw_rate_variance = R(2, 2) / dt;
-  if (s.channel != FusionChannel::kWheel) m.yaw_rate_variance += kYawTime * combined_variance(imm_, drift);
+  if (ins) m.yaw_rate_variance += kYawTime * combined_variance(imm_, kInsDrift);
   if (better_yaw_elsewhere(s, m.yaw_rate_variance)) {
     R.row(2).setZero();
     R.col(2).setZero();

@@ -18,8 +18,8 @@ enum Index {
   kBase = 6,                ///< the motion models' own states end here
   kVoClone = 6,             ///< east, north, yaw at the last use of vision (stochastic cloning)
   kVoScale = 9,             ///< log of measured over true length
-  kVoDrift = 10,            ///< rad/s, measured yaw rate less true
-  kWheelScale = 11,         ///< likewise
+  kVoTurns = 10,            ///< log of measured over true turns
+  kWheelScale = 11,         ///< log of measured over true length
   kInsVelocity = 12,        ///< m/s, east and north: error of the INS velocity, which lasts through an outage
   kInsDrift = 14,           ///< rad/s, measured yaw rate of the INS less true: its gyro bias' error
   kInsClone = 15,           ///< the pose at the last use of the INS; last, for it is seldom there (FusionEstimate)

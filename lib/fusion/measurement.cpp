@@ -10,9 +10,8 @@ using namespace fusion;
 
 namespace {
 
-double length_factor(const Vector& x, const ChannelSlots& slots) {
-  return slots.scale ? std::exp(x(*slots.scale)) : 1.0;
-}
+/// exp of a log scale.
+double factor(const Vector& x, const std::optional<int>& log) { return log ? std::exp(x(*log)) : 1.0; }
 
 /// Where the channel believes the vehicle to be, its velocity error since the clone included.
 Planar seen(const Vector& x, const ChannelSlots& slots, double dt) {
@@ -54,7 +53,7 @@ ScalarMeasurement told_turn(const Vector& x, double turn, double sigma) {
 }
 
 ScalarMeasurement told_speed(const Vector& x, const ChannelSlots& slots, double speed, double variance) {
-  const double length = length_factor(x, slots);
+  const double length = factor(x, slots.scale);
   ScalarMeasurement m{{kSpeed}, {length}, 1, speed - length * x(kSpeed), variance};
   const auto also = [&](int index, double h) {
     m.index[static_cast<std::size_t>(m.count)] = index;
@@ -71,8 +70,10 @@ ScalarMeasurement told_speed(const Vector& x, const ChannelSlots& slots, double 
 
 Planar predicted_motion(const Vector& x, const ChannelSlots& slots, double dt) {
   Planar m = motion_between(x.segment<3>(slots.clone), seen(x, slots, dt));
-  m.head<2>() *= length_factor(x, slots);
-  if (slots.drift) m.z() = wrap_angle(m.z() + x(*slots.drift) * dt);
+  m.head<2>() *= factor(x, slots.scale);
+  m.z() *= factor(x, slots.turns);
+  if (slots.drift) m.z() += x(*slots.drift) * dt;
+  m.z() = wrap_angle(m.z());
   return m;
 }
 
@@ -83,8 +84,10 @@ FusionMeasurement<3> relative_motion(const Vector& x, const ChannelSlots& slots,
   FusionMeasurement<3> m;
   m.H.middleCols<3>(kPos) = motion_by_end(clone);
   m.H.middleCols<3>(slots.clone) = motion_by_start(clone, now);
-  m.H.topRows<2>() *= length_factor(x, slots);
+  m.H.topRows<2>() *= factor(x, slots.scale);
+  m.H.row(2) *= factor(x, slots.turns);
   if (slots.scale) m.H.block<2, 1>(0, *slots.scale) = predicted.head<2>();
+  if (slots.turns) m.H(2, *slots.turns) = factor(x, slots.turns) * wrap_angle(now.z() - clone.z());
   if (slots.drift) m.H(2, *slots.drift) = dt;
   if (slots.velocity) m.H.block<2, 2>(0, *slots.velocity) = dt * m.H.block<2, 2>(0, kPos);
   m.innovation = motion - predicted;
@@ -152,26 +155,28 @@ void carry_clone(FusionEstimate& e, const ChannelSlots& slots, const Planar& mot
                  const Eigen::Matrix3d& R) {
   const int c = slots.clone;
   const Planar start = e.x.segment<3>(c);
-  const double length = length_factor(e.x, slots);
+  const double length = factor(e.x, slots.scale), turns = factor(e.x, slots.turns);
   Planar told = motion;
   told.head<2>() /= length;
-  if (slots.drift) told.z() -= dt * e.x(*slots.drift);
+  told.z() /= turns;
   const Planar next = after_motion(start, told);
   // The Jacobian's way is the speed's, not the measured one: that has the picture's error, which the innovation has
-  // too, so that pictures would always say that lengths are shorter (MODEL.md, section 4).
+  // too, so that pictures would always say that lengths are shorter (MODEL.md, section 4). Likewise the turn.
   const double heading = start.z() + 0.5 * told.z();
   const Eigen::Vector2d way = dt * e.x(kSpeed) * Eigen::Vector2d(std::cos(heading), std::sin(heading));
+  const double turn = wrap_angle(e.x(kYaw) - start.z());
   Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
   A(0, 2) = -way.y();
   A(1, 2) = way.x();
   Eigen::Matrix<double, 3, kSize> rows = A.lazyProduct(e.P.middleRows<3>(c));  // cov(next, x)
   if (slots.scale) rows.topRows<2>() -= way * e.P.row(*slots.scale);
-  if (slots.drift) rows.row(2) -= dt * e.P.row(*slots.drift);
+  if (slots.turns) rows.row(2) -= turn * e.P.row(*slots.turns);
   Eigen::Matrix3d P = rows.middleCols<3>(c).eval().lazyProduct(A.transpose());
   if (slots.scale) P.leftCols<2>() -= rows.col(*slots.scale) * way.transpose();
-  if (slots.drift) P.col(2) -= dt * rows.col(*slots.drift);
+  if (slots.turns) P.col(2) -= turn * rows.col(*slots.turns);
   Eigen::Matrix3d to_frame = motion_by_end(start).transpose();
   to_frame.leftCols<2>() /= length;
+  to_frame.col(2) /= turns;
   P += to_frame * R * to_frame.transpose();
   e.x.segment<3>(c) = next;
   e.P.middleRows<3>(c) = rows;

@@ -27,6 +27,7 @@ PlanarEstimate planar_estimate(const FusionEstimate& e);
 struct ChannelSlots {
   int clone = fusion::kInsClone;
   std::optional<int> scale;
+  std::optional<int> turns;
   std::optional<int> drift;
   std::optional<int> velocity;  ///< east and north: a lasting error of the motion
 };

@@ -155,7 +155,6 @@ void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double d
   e.P.block<2, 2>(kPos, kPos) += 2.0 * noise.slip_time * slip * slip * dt * across * across.transpose();
 
   for (const int i : {int{kVoScale}, int{kWheelScale}}) e.P(i, i) += noise.scale_walk * noise.scale_walk * dt;
-  e.P(kVoDrift, kVoDrift) += noise.drift_walk * noise.drift_walk * dt;
   move_mean(e.x, kind, dt, a);
 }
 

@@ -18,7 +18,6 @@ struct MotionNoise {
   double slip_arm = 1.5;        ///< m: sideways speed per yaw rate, of an origin that is not at the rear axle
   double slip_time = 1.0;       ///< s, for which a slip lasts
   double scale_walk = 2e-5;     ///< per sqrt(s), of the odometries' scales
-  double drift_walk = 2e-6;     ///< rad/s per sqrt(s), of their yaw drifts
 };
 
 /// Mean after dt; clones and parameters stay.
@@ -48,7 +47,6 @@ void visit(MotionNoise& c, Visitor& v) {
   v.number("slip_arm_m", c.slip_arm, 0.0, 100.0);
   v.number("slip_time_s", c.slip_time, 0.0, 100.0);
   v.number("scale_walk_per_rts", c.scale_walk, 0.0, 0.1);
-  v.number("drift_walk_radps_per_rts", c.drift_walk, 0.0, 0.1);
 }
 
 }  // namespace roadfix

@@ -26,7 +26,7 @@ inline FusionEstimate random_estimate(Draws& draws) {
   e.x.head<fusion::kStates>() = draws.vector<fusion::kStates>(1.0);
   e.x(fusion::kSpeed) = 10.0 + draws.normal(3.0);
   for (const int i : {int{fusion::kVoScale}, int{fusion::kWheelScale}}) e.x(i) = draws.normal(0.05);
-  e.x(fusion::kVoDrift) = draws.normal(0.01);
+  e.x(fusion::kVoTurns) = draws.normal(0.05);
   fusion::StatesCovariance A;
   for (int i = 0; i < fusion::kStates; ++i) A.col(i) = draws.vector<fusion::kStates>(0.2);
   e.P.topLeftCorner<fusion::kStates, fusion::kStates>() = A * A.transpose();

@@ -68,7 +68,7 @@ TEST_CASE("a gyro whose bias is known holds against a vision that turns away for
   // vision's yaw in each step; known to last, it is worth more.
   Tunnel t;
   t.ins.yaw_walk = 2e-5;
-  t.vo.drift_std = 0.0;
+  t.vo.turns_std = 0.0;
   constexpr double kBias = 2e-4, kAway = 1.2e-3;  // rad/s
   t.vo.fault = [](double s, Planar& motion) {
     if (s > 60.0 && s < 65.0) motion.z() += 0.1 * kAway;

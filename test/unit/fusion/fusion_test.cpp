@@ -294,14 +294,12 @@ TEST_CASE("the local pose never jumps, whatever the absolute one does") {
 TEST_CASE("two odometries of one gyro are not two witnesses of the yaw") {
   Tunnel t;
   t.with_wheels = false;
-  t.vo.drift_std = 0.0;
+  t.vo.turns_std = 0.0;
   const auto yaw_sigma = [&](bool shared) {
     auto events = t.events();
     for (StreamEvent& e : events)
       if (e.sample.channel == FusionChannel::kVo) e.sample.shares_imu = shared;
-    FusionConfig c;
-    c.vo_drift_std = 1e-7;
-    Fusion fusion(c);
+    Fusion fusion({});
     double sigma = 0.0;
     run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
       if (seconds(t.drive, e.sample.odometry.t_us) < 99.0) sigma = std::sqrt(f.estimate().P(kYaw, kYaw));

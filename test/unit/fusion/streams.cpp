@@ -116,10 +116,9 @@ std::vector<StreamEvent> ins_stream(const SimulatedDrive& drive, const InsNoise&
 std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& n, std::uint64_t seed) {
   const auto source = std::make_unique<RandomStream>(seed, 102);
   RandomStream& random = *source;
-  const double scale = std::exp(n.scale_std * random.normal()), drift = n.drift_std * random.normal();
+  const double scale = std::exp(n.scale_std * random.normal()), turns = std::exp(n.turns_std * random.normal());
   std::vector<StreamEvent> events;
   const auto step_us = static_cast<int64_t>(std::llround(1e6 / n.rate_hz));
-  const double dt = static_cast<double>(step_us) * 1e-6;
   Odometry estimate;
   std::optional<Odometry> last;
   for (int64_t t_us = step_us; t_us <= duration_us(drive) - step_us; t_us += step_us) {
@@ -128,7 +127,8 @@ std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& n
       Planar motion = motion_between(planar_pose(*last), planar_pose(truth));
       const double sigma = std::hypot(n.step_sigma, n.step_share * motion.head<2>().norm());
       motion.head<2>() *= scale;
-      motion += Planar(sigma * random.normal(), sigma * random.normal(), drift * dt + n.yaw_step * random.normal());
+      motion.z() *= turns;
+      motion += Planar(sigma * random.normal(), sigma * random.normal(), n.yaw_step * random.normal());
       const double rise = scale * (truth.T_frame_vehicle.p.z() - last->T_frame_vehicle.p.z());
       last = truth;
       if (n.fault && !n.fault(static_cast<double>(t_us) * 1e-6, motion)) continue;
@@ -159,7 +159,8 @@ std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& n
   return events;
 }
 
-std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, const VoNoise& noise, std::uint64_t seed) {
+std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, VoNoise noise, std::uint64_t seed) {
+  noise.turns_std = 0.0;
   std::vector<StreamEvent> events = vo_stream(drive, noise, seed + 1000);
   for (StreamEvent& e : events) e.sample.channel = FusionChannel::kWheel;
   return events;

@@ -34,7 +34,7 @@ struct VoNoise {
   double step_share = 0.002;  ///< of the step
   double yaw_step = 1.5e-4;   ///< rad per frame
   double scale_std = 0.01;    ///< drawn once
-  double drift_std = 1e-4;    ///< rad/s, drawn once
+  double turns_std = 0.003;   ///< share of the turns, drawn once
   /// A frame's fault: changes the measured motion, or drops the frame (false).
   std::function<bool(double t_s, Planar& motion)> fault;
 };
@@ -47,8 +47,8 @@ struct StreamEvent {
 
 std::vector<StreamEvent> ins_stream(const SimulatedDrive& drive, const InsNoise& noise, std::uint64_t seed);
 std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& noise, std::uint64_t seed);
-/// As the VO's, in the wheels' channel.
-std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, const VoNoise& noise, std::uint64_t seed);
+/// As the VO's, in the wheels' channel, but for the turns' share: the fusion knows none of wheels.
+std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, VoNoise noise, std::uint64_t seed);
 
 /// In the order of time, GNSS/INS first.
 std::vector<StreamEvent> merged(std::vector<std::vector<StreamEvent>> streams);

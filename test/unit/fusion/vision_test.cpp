@@ -36,7 +36,7 @@ std::vector<StreamEvent> shaky(const Tunnel& t, double yaw_sigma) {
 
 TEST_CASE("what each picture errs by anew is not taken for a way that was driven") {
   Tunnel t;
-  t.vo.drift_std = 0.0;
+  t.vo.turns_std = 0.0;
   t.vo.yaw_step = 2e-5;
   const std::vector<StreamEvent> events = shaky(t, 4e-4);
   const auto ends = [&](double known) {
@@ -173,35 +173,36 @@ TEST_CASE("who gave way to an INS that vision contradicts says so, and how wrong
   CHECK(g.coasting);
 }
 
-TEST_CASE("a gyro bias of the vision is learnt while GNSS is good") {
+TEST_CASE("what a vision's turns have wrong alike is learnt while GNSS is good") {
   Tunnel t;
   t.ins.yaw_walk = 1e-5;
   t.ins.yaw_sigma = 5e-4;
-  t.vo.drift_std = 4e-3;  // rad/s; what was drawn is measured below
+  t.vo.turns_std = 0.05;  // what was drawn is measured below
   const std::vector<StreamEvent> events = t.events();
   const auto learnt = [&](double expected) {
     FusionConfig c;
-    c.vo_drift_std = expected;
+    c.vo_turns_std = expected;
     Fusion fusion(c);
-    std::optional<double> first;  // yaw of the vision less the true one
-    double drift = 0.0, estimate = 0.0;
+    std::optional<Planar> first, first_true;
+    double turns = 0.0, estimate = 0.0;
     run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
       const Odometry& o = e.sample.odometry;
       const double s = seconds(t.drive, o.t_us);
       if (e.sample.channel != FusionChannel::kVo || s > 40.0) return;
-      const double off = planar_pose(o).z() - planar_pose(t.drive.truth_at(o.t_us)).z();
-      if (!first) first = off;
-      drift = wrap_angle(off - *first) / s;
-      estimate = f.estimate().x(kVoDrift);
+      const Planar seen = planar_pose(o), is = planar_pose(t.drive.truth_at(o.t_us));
+      if (!first) first = seen, first_true = is;
+      const double turned = motion_between(*first_true, is).z();
+      if (std::abs(turned) > 1.0) turns = std::log(motion_between(*first, seen).z() / turned);
+      estimate = f.estimate().x(kVoTurns);
     });
-    return std::pair(drift, estimate);
+    return std::pair(turns, estimate);
   };
-  const auto [drift, estimate] = learnt(1e-3);
-  INFO(drift << " rad/s, estimated " << estimate);
-  REQUIRE(std::abs(drift) > 3e-4);
-  CHECK(std::abs(estimate - drift) < 0.25 * std::abs(drift));
+  const auto [turns, estimate] = learnt(0.05);
+  INFO(turns << ", estimated " << estimate);
+  REQUIRE(std::abs(turns) > 0.01);
+  CHECK(std::abs(estimate - turns) < 0.25 * std::abs(turns));
   const auto closed = learnt(1e-9);
-  CHECK(std::abs(closed.second - closed.first) > 0.5 * std::abs(drift));  // teeth
+  CHECK(std::abs(closed.second - closed.first) > 0.5 * std::abs(turns));  // teeth
 }
 
 /// What the fusion takes for the log scale of a vision, of which alone it hears, and whose velocities are longer than
@@ -240,7 +241,7 @@ TEST_CASE("a vision alone learns no scale from itself, whatever its velocities s
 double yaw_off(double said) {
   Tunnel t;
   t.with_wheels = false;
-  t.vo.drift_std = 0.0;
+  t.vo.turns_std = 0.0;
   std::vector<StreamEvent> events = t.events();
   for (StreamEvent& e : events) {
     e.sample.shares_imu = e.sample.channel == FusionChannel::kVo;
