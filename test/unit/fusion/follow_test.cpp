@@ -65,11 +65,12 @@ TEST_CASE("alone, the INS's height is what the fusion gives, however little the 
 
 TEST_CASE("a gyro whose bias is known holds against a vision that turns away for some seconds") {
   // The INS says of its yaw what its gyro's bias adds up to. Taken for independent steps, that is worth less than the
-  // vision's yaw in each step; known to last, it is worth more.
+  // vision's yaw in each step; known to last, it is worth more. After 25 s this bias turns the INS by 1.3e-3 rad, this
+  // vision is unsure of 2.4e-3: of the 6e-3 that it turns, 22 % are to be believed, as independent steps 31 %.
   Tunnel t;
   t.ins.yaw_walk = 2e-5;
   t.vo.turns_std = 0.0;
-  constexpr double kBias = 2e-4, kAway = 1.2e-3;  // rad/s
+  constexpr double kBias = 5e-5, kAway = 1.2e-3;  // rad/s
   t.vo.fault = [](double s, Planar& motion) {
     if (s > 60.0 && s < 65.0) motion.z() += 0.1 * kAway;
     return true;
@@ -92,7 +93,7 @@ TEST_CASE("a gyro whose bias is known holds against a vision that turns away for
     });
     return std::abs(after - before);
   };
-  CHECK(turned(kBias) < 0.9 * turned(0.0));
+  CHECK(turned(kBias) < 0.8 * turned(0.0));
 }
 
 TEST_CASE("an INS that comes back with a velocity it does not know is not carried forward as one that does") {
