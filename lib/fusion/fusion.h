@@ -27,8 +27,10 @@ struct ChannelSample {
   FusionChannel channel = FusionChannel::kIns;
   Odometry odometry;  ///< covariances without what the channel's whole way has in common: without_common()
   int reset_counter = 0;
-  bool metric = true;       ///< false: lengths are up to a common factor
-  bool shares_imu = false;  ///< its yaw comes from the gyro that the INS uses
+  bool metric = true;  ///< false: lengths are up to a common factor
+  /// A filter over the gyro that the INS uses (an MSCKF): its yaw is no second witness, and its poses take back what
+  /// its whole way has had wrong, so that its velocities tell its motion.
+  bool shares_imu = false;
   int64_t seq = 0;
 };
 

@@ -25,10 +25,10 @@ bool corrected(const LevelView& last, const LevelView& now) {
 
 }  // namespace
 
-/// Motion since the last use. Where the INS corrected itself in between, its velocities tell the motion without the
-/// jump.
+/// Motion since the last use. A filter's corrections of its past are none: its velocities tell the motion without them.
 Planar Fusion::motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const {
-  return channel == FusionChannel::kIns ? motion_by_velocity(last, now).way : motion_between(last.pose, now.pose);
+  const bool filter = channel == FusionChannel::kIns || memory(channel).shares_imu;
+  return filter ? motion_by_velocity(last, now).way : motion_between(last.pose, now.pose);
 }
 
 /// A vision without scale takes the first one from what the others say of the same motion.

@@ -45,7 +45,7 @@ void Fusion::move_height(const ChannelSample& s, const LevelView& view) {
   const double way = s.odometry.velocity.norm() * dt;
   double step = view.velocity.z() * std::min(dt, kClimbsOn), grown = height_growth(way, dt);
   if (m.last->t_us == height_us_) {
-    step = s.odometry.T_frame_vehicle.p.z() - m.last->T_frame_vehicle.p.z();
+    if (!s.shares_imu) step = s.odometry.T_frame_vehicle.p.z() - m.last->T_frame_vehicle.p.z();
     if (std::abs(step) > config_.jump_tolerance + 0.3 * way) step = 0.0;
     grown = std::max(grown, s.odometry.cov_pose(2, 2) - m.last->cov_pose(2, 2));
   }

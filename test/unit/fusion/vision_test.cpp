@@ -271,6 +271,40 @@ TEST_CASE("of two that share a gyro the one that knows its bias speaks of the ya
   CHECK(hidden > 0.1);  // teeth
 }
 
+/// Place error (rms, m) in a tunnel beside an MSCKF whose lengths are off by 1 % one way and the other, each time along
+/// its whole way; `filter`: the fusion is told what it is.
+double off_beside_filter(bool filter) {
+  Tunnel t;
+  t.with_wheels = false;
+  t.vo.scale_std = 0.0;
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events) {
+    if (e.sample.channel != FusionChannel::kVo) continue;
+    Odometry& o = e.sample.odometry;
+    const double lengths = 1.0 + 0.01 * std::sin(seconds(t.drive, o.t_us));
+    o.T_frame_vehicle.p *= lengths;
+    o.velocity *= lengths;
+    e.sample.shares_imu = filter;
+  }
+  Fusion fusion({});
+  double sum = 0.0;
+  int count = 0;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    if (s < 50.0 || s > 99.0) return;
+    sum += std::pow(test::planar_error(t.drive, f.fused()).distance(), 2);
+    ++count;
+  });
+  return std::sqrt(sum / count);
+}
+
+TEST_CASE("what an MSCKF takes back of its way is no motion") {
+  const double told = off_beside_filter(true), taken = off_beside_filter(false);
+  INFO(told << " m; by its poses " << taken);
+  CHECK(told < 1.0);
+  CHECK(taken > 3.0);  // teeth
+}
+
 /// A vision drives alone for five seconds; the sigma of its log scale by what `first` says of itself.
 double scale_sigma_alone(double first_sigma) {
   Tunnel t;
