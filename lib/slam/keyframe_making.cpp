@@ -142,8 +142,10 @@ void KeyframeTracker::finish_bundle() {
   front_end_->drop(wrong);
   for (const int64_t track : wrong) pixels_.erase(track);
   T_map_camera_ = map_.last().T_map_camera;  // the frame before this one was the job's last keyframe
-  const auto steps = static_cast<double>(std::max<size_t>(1, job_->keyframes.size() - 1));
-  const Matrix6d grown = job_->report.clustered_cov_last / steps;
+  // From the last keyframe held to the newest, (M.14).
+  const auto& views = job_->problem.views;
+  const auto steps = std::count_if(views.begin(), views.end(), [](const auto& view) { return !view.fixed; });
+  const Matrix6d grown = job_->report.clustered_cov_last / static_cast<double>(std::max<ptrdiff_t>(1, steps));
   cov_keyframe_ += grown;
   cov_own_ += grown;
   cov_closed_ += in_map(grown, loops_.S_map_odom());

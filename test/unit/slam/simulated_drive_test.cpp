@@ -90,7 +90,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
   for (int i = 0; i < static_cast<int>(picture.total()); ++i) picture.data[i] = static_cast<uint8_t>(37 * i);
 
   Drive result;
-  constexpr double kSpeedSigma = 0.01;  // m/s
+  constexpr double kSpeedSigma = 0.05;  // m/s: 5 mm a frame, the least that the tracker takes a told way to be off by
   std::mt19937 random(static_cast<unsigned>(seed));
   std::normal_distribution<double> speed_noise(0.0, kSpeedSigma);
   std::optional<SE3> T_local_enu;
@@ -150,8 +150,8 @@ TEST_CASE("the covariance is that of the errors, whatever the noise", "[statisti
       // What scripts/figures.d/keyframe_tracker.py reads.
       std::printf("nees %s %.1f px: %.3f, median error %.3f m, median sigma %.3f m\n", stereo ? "stereo" : "mono",
                   noise_px, d.nees, d.error, d.sigma);
-      CHECK(d.nees > 0.5);
-      CHECK(d.nees < 2.0);
+      CHECK(d.nees > 0.6);  // three sigmas of the mean of 20 drives
+      CHECK(d.nees < 1.4);
       mean += 0.25 * d.nees;
     }
   }
