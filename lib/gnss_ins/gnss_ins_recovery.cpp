@@ -116,7 +116,7 @@ void GnssIns::show_anew(const Pending& p) {
   const bool returned = position_at_us_ != 0 && config_.aiding.use_return_error;
   for (size_t type = 0; type < position_quality_.size(); ++type) {
     PositionQuality& quality = position_quality_[type];
-    const bool alike = type != static_cast<size_t>(FixType::kRtkFixed) && !returned;
+    const bool alike = type != static_cast<size_t>(FixType::kRtkFixed);
     quality.correlation.assume(alike ? std::exp(-fix_interval_ / kCodeAlike) : 0.0);
     if (returned) quality.noise.begin_anew();
   }
