@@ -68,15 +68,15 @@ F8 windows(const SurfaceLanes& p, F8 below, F8 speckle) {
   const F8 pane = mix(0.04F + 0.12F * fraction(c.hash, 0), splat(0.45F),
                       blind * select(fraction(c.hash, 16) < 0.4F, splat(1.0F), splat(0.0F)));
   const F8 trim = select(fraction(p.key, 24) < 0.5F, below * 0.55F, below * 0.5F + 0.4F);
-  const F8 wall = mix(below + speckle, trim, coverage(c.t, p.width_t, splat(0.0F), splat(0.14F)));
+  const F8 wall = mix(below + speckle, trim, periodic_coverage(p.t, p.width_t, p.pattern_t, splat(0.0F), splat(0.14F)));
   return mix(mix(wall, trim, outer), mix(pane, trim, bars), inner);
 }
 
 F8 courses(const SurfaceLanes& p, F8 below, F8 speckle) {
   const Cell c = cell_of(p);
   const F8 joint = min(splat(0.03F), 0.06F * p.pattern_t);
-  const F8 covered =
-      clamp01(coverage(c.s, p.width_s, splat(0.0F), joint) + coverage(c.t, p.width_t, splat(0.0F), joint));
+  const F8 covered = clamp01(periodic_coverage(p.s, p.width_s, p.pattern_s, splat(0.0F), joint) +
+                             periodic_coverage(p.t, p.width_t, p.pattern_t, splat(0.0F), joint));
   const F8 stone = below * (0.85F + 0.3F * fraction(c.hash, 0)) + speckle;
   return mix(stone, below * 0.5F, covered);
 }

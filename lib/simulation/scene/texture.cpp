@@ -157,11 +157,8 @@ F8 smooth_noise(const SurfaceLanes& p, const LayerLanes& layer, U8 key) {
   return layer.amplitude * keep * (2.0F * mix(low, high, ease_y) - 1.0F);
 }
 
-/// In two of three cells a rectangle of random place, size and shade.
-F8 patches(const SurfaceLanes& p, const LayerLanes& layer, U8 key) {
-  const F8 keep = clamp01(2.0F - 2.0F * layer.wx) * clamp01(2.0F - 2.0F * layer.wy);
-  if (!any(keep > 0.0F)) return splat(0.0F);
-  const Cells c = cells_of(p, layer);
+/// In two of three cells a rectangle of random place, size and shade: the shade times the share covered.
+F8 patch_of(const Cells& c, const LayerLanes& layer, U8 key) {
   const U8 h = hash_cell(c.x, c.y, key);
   const U8 g = mix_bits(h + 0x9E3779B9U);
   const F8 left = 0.06F + 0.45F * fraction(h, 0);
@@ -169,9 +166,36 @@ F8 patches(const SurfaceLanes& p, const LayerLanes& layer, U8 key) {
   const F8 covered = coverage(c.fx, layer.wx, left, left + 0.12F + 0.30F * fraction(h, 16)) *
                      coverage(c.fy, layer.wy, bottom, bottom + 0.12F + 0.30F * fraction(h, 24));
   const F8 shade = 2.0F * fraction(g, 0) - 1.0F;
-  return select(fraction(g, 8) < 0.66F,
-                layer.amplitude * keep * covered * (shade + select(shade < 0.0F, splat(-0.5F), splat(0.5F))),
+  return select(fraction(g, 8) < 0.66F, covered * (shade + select(shade < 0.0F, splat(-0.5F), splat(0.5F))),
                 splat(0.0F));
+}
+
+/// The cells whose rectangles the footprint touches: it is at most one cell wide and may reach beyond its own on the
+/// nearer side. Left out, rectangles seen from afar would lie beside their place.
+F8 patches(const SurfaceLanes& p, const LayerLanes& layer, U8 key) {
+  const F8 keep = clamp01(2.0F - 2.0F * layer.wx) * clamp01(2.0F - 2.0F * layer.wy);
+  if (!any(keep > 0.0F)) return splat(0.0F);
+  const Cells own = cells_of(p, layer);
+  const I8 step_x = 1 + 2 * (own.fx < 0.5F), step_y = 1 + 2 * (own.fy < 0.5F);  // a mask is -1 where it holds
+  const auto beside = [&](bool across, bool up) {
+    Cells c = own;
+    if (across) {
+      c.x = add_wrapping(c.x, step_x);
+      c.fx -= to_float(step_x);
+    }
+    if (up) {
+      c.y = add_wrapping(c.y, step_y);
+      c.fy -= to_float(step_y);
+    }
+    return patch_of(c, layer, key);
+  };
+  const bool across = any(abs(own.fx - 0.5F) + 0.5F * layer.wx > 0.5F);
+  const bool up = any(abs(own.fy - 0.5F) + 0.5F * layer.wy > 0.5F);
+  F8 shade = beside(false, false);
+  if (across) shade += beside(true, false);
+  if (up) shade += beside(false, true);
+  if (across && up) shade += beside(true, true);
+  return layer.amplitude * keep * shade;
 }
 
 }  // namespace
