@@ -1,12 +1,16 @@
 /// Keyframes: when one is made, what is taken into the map with it, and its adjustment, begun here and taken in before
 /// the next frame. And what holds the pose at a standstill that has left the map without landmarks.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
+#include "geometry/frames.h"
 #include "slam/keyframe_tracker.h"
 #include "slam/pose_covariance.h"
+#include "slam/short_way.h"
+#include "slam/triangulation.h"
 
 namespace roadfix {
 namespace {
@@ -73,6 +77,49 @@ bool KeyframeTracker::hold(const CameraFrame& frame, const std::vector<Feature>&
   out_.reason = "standing, with few landmarks";
   accept(frame.t_us, map_.last().T_map_camera, variances.asDiagonal());
   if (few) make_keyframe(frame, features);
+  return true;
+}
+
+/// A car that pulls away from there has tracks without points still. They tell the turn, speeds how far it has gone,
+/// and a car goes where it points: a pose, until the tracks have the parallax of points. (M.7b), (M.7c).
+bool KeyframeTracker::pull_away(const CameraFrame& frame, const std::vector<Feature>& features) {
+  const Keyframe& from = map_.last();
+  const auto told = travelled(from.t_us, frame.t_us);
+  const bool mono_with_scale = !stereo_ && scale_ != ScaleSource::kNone;
+  if (!mono_with_scale || !told || out_.num_landmarks_seen >= config_.min_inliers) return false;
+  std::vector<size_t> index;
+  std::vector<Eigen::Vector2d> first, second;
+  for (size_t i = 0; i < features.size(); ++i) {
+    const Landmark* landmark = map_.find(features[i].track);
+    const auto now = left_.unproject(features[i].pixel.cast<double>());
+    if (landmark == nullptr || landmark->sightings.empty() || !now) continue;
+    const Sighting& seen = landmark->sightings.back();
+    if (seen.keyframe != from.id) continue;
+    index.push_back(i);
+    first.push_back(map_.lens().straighten(seen.left));
+    second.push_back(map_.lens().straighten(*now));
+  }
+  const Eigen::Quaterniond q_start = from.T_map_camera.q.conjugate() * predict(frame.t_us).q;
+  const Eigen::Vector3d ahead = rig_.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitX();
+  const ShortWayConfig config{left_.focal(), config_.sigma_px, config_.gate_px, config_.weak_inliers, ahead};
+  const double length_sigma = std::max(kMinTravelSigma, told->travel.sigma);
+  auto way = short_way(first, second, told->travel.distance, length_sigma, q_start, config);
+  if (!way) return false;
+  const auto of_camera = camera_travelled(from.t_us, SE3{}, frame.t_us, way->T_first_second);
+  if (of_camera) way->T_first_second.p = of_camera->travel.distance * ahead;
+  out_.state = TrackState::kWeak;
+  out_.reason = "pulling away, with few landmarks";
+  accept(frame.t_us, from.T_map_camera * way->T_first_second,
+         in_map(way->cov_pose(length_sigma), {from.T_map_camera.q, {}, 1.0}));
+  int points = 0;
+  for (size_t k = 0; k < index.size(); ++k) {
+    if (!way->inlier[k]) out_.features[index[k]].use = FeatureUse::kOutlier;
+    const std::array<Ray, 2> rays{ray(SE3{}, first[k]), ray(way->T_first_second, second[k])};
+    points += way->inlier[k] && triangulate(rays, config_.min_parallax_deg * kDegree) ? 1 : 0;
+  }
+  if (points < std::min(config_.start_points, static_cast<int>(index.size()) / 2)) return true;
+  drop_wrong_tracks(features);
+  make_keyframe(frame, features);
   return true;
 }
 

@@ -167,7 +167,7 @@ void KeyframeTracker::follow(const CameraFrame& frame) {
   out_.num_expected = front_end_->num_expected();
   out_.num_matches = static_cast<int>(features.size());
   if (!solve(features, T_predicted)) {
-    if (!hold(frame, features)) miss(frame.t_us, "too few landmarks agree on a pose");
+    if (!hold(frame, features) && !pull_away(frame, features)) miss(frame.t_us, "too few landmarks agree on a pose");
     return;
   }
   drop_wrong_tracks(features);

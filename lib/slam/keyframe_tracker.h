@@ -223,6 +223,7 @@ class KeyframeTracker {
   [[nodiscard]] std::vector<double> flows_beyond(const Eigen::Quaterniond& q_now_keyframe,
                                                  const std::vector<Feature>& features) const;
   [[nodiscard]] bool hold(const CameraFrame& frame, const std::vector<Feature>& features);
+  [[nodiscard]] bool pull_away(const CameraFrame& frame, const std::vector<Feature>& features);
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
   void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features);
   void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);

@@ -8,11 +8,6 @@
 #include "slam/triangulation.h"
 
 namespace roadfix {
-namespace {
-
-constexpr double kMinTravelSigma = 0.005;  ///< m; no speed sensor is better between two pictures
-
-}  // namespace
 
 LocalMap::LocalMap(const CameraRig& rig, const KeyframeTrackerConfig& config)
     : rig_(rig), config_(config), focal_px_(Camera(rig.left).focal()) {

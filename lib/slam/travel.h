@@ -24,6 +24,8 @@ struct SpeedSample {
   }
 };
 
+constexpr double kMinTravelSigma = 0.005;  ///< m; no speed sensor is better between two pictures
+
 struct Travel {
   double distance = 0.0;  ///< m
   double sigma = 0.0;     ///< m, without the scale error that all distances share

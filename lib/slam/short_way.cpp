@@ -1,0 +1,128 @@
+#include "slam/short_way.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "geometry/so3.h"
+
+namespace roadfix {
+namespace {
+
+constexpr std::array<double, 4> kGateFactor{8.0, 4.0, 2.0, 1.0};  ///< the gate narrows, as in pose_solver.cpp
+constexpr int kStepsPerRound = 4;
+constexpr double kAheadSigma = 0.2;     ///< rad: a camera 1.5 m before the rear axle, on a circle of 7.5 m
+constexpr double kInverseDepth = 0.1;   ///< 1/m, of what a street shows, and its standard deviation
+constexpr double kBackwards = 3.0;      ///< sigmas by which the points lie behind: the car backs out
+constexpr double kMinDepthShare = 0.2;  ///< of a point's depth that is left when the way has been gone
+
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
+
+/// Two axes across a direction.
+Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& direction) {
+  Eigen::Matrix<double, 3, 2> B;
+  B.col(0) = direction.unitOrthogonal();
+  B.col(1) = direction.cross(B.col(0));
+  return B;
+}
+
+/// (M.7b) of one track and its derivatives.
+struct Residual {
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 5> J;  ///< by direction and turn
+  Eigen::Vector2d g;              ///< by inverse depth
+};
+
+/// The way told as it is used to explain the tracks: at least what it is doubted by.
+struct Street {
+  std::span<const Eigen::Vector2d> first, second;
+  double length, sigma;
+  Eigen::Vector3d ahead;
+
+  [[nodiscard]] Residual residual(size_t i, const ShortWay& way) const {
+    const Eigen::Matrix3d R_second_first = way.T_first_second.q.conjugate().toRotationMatrix();
+    const Eigen::Vector3d moved = first[i].homogeneous() - kInverseDepth * length * ahead;
+    const Eigen::Vector3d p = R_second_first * moved;
+    const double z = std::max(kMinDepthShare, p.z());
+    Eigen::Matrix<double, 2, 3> J_point;
+    J_point << 1.0 / z, 0.0, -p.x() / (z * z), 0.0, 1.0 / z, -p.y() / (z * z);
+    Residual out;
+    out.r = (p.head<2>() / z - second[i]) / sigma;
+    out.J << -kInverseDepth * length * J_point * R_second_first * way.across / sigma, J_point * skew(p) / sigma;
+    out.g = -length * J_point * R_second_first * ahead / sigma;
+    return out;
+  }
+};
+
+/// What a track tells of the turn, its inverse depth and what that and the direction move it by together unknown.
+Eigen::Matrix2d information(const Residual& e) {
+  const Eigen::Vector2d along = kInverseDepth * e.g;
+  const Eigen::Matrix2d aside = kAheadSigma * e.J.leftCols<2>();
+  const Eigen::Matrix2d cov = Eigen::Matrix2d::Identity() + along * along.transpose() + aside * aside.transpose();
+  return cov.inverse();
+}
+
+}  // namespace
+
+Matrix6d ShortWay::cov_pose(double length_sigma) const {
+  const double length = T_first_second.p.norm();
+  const Eigen::Vector3d direction = across.col(0).cross(across.col(1));
+  Eigen::Matrix<double, 6, 5> F = Eigen::Matrix<double, 6, 5>::Zero();
+  F.topLeftCorner<3, 2>() = length * across;
+  F.bottomRightCorner<3, 3>().setIdentity();
+  Matrix6d out = F * cov * F.transpose();
+  const double shorter = length * cov(0, 0);  // who goes aside comes less far ahead: second order, (M.7c)
+  out.topLeftCorner<3, 3>() +=
+      (length_sigma * length_sigma + 2.0 * shorter * shorter) * direction * direction.transpose();
+  return out;
+}
+
+std::optional<ShortWay> short_way(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second,
+                                  double length, double length_sigma, const Eigen::Quaterniond& q_start,
+                                  const ShortWayConfig& config) {
+  const double sigma = std::sqrt(2.0) * config.sigma_px / config.focal_px;  // both pictures'
+  const double gate = config.gate_px / config.sigma_px;
+  const Street street{first, second, std::hypot(length, length_sigma), sigma, config.ahead};
+  ShortWay way{{q_start, length * config.ahead}, axes_across(config.ahead), {}, {}};
+  Matrix5d H;
+  for (const double factor : kGateFactor) {
+    for (int step = 0; step < kStepsPerRound; ++step) {
+      H.setZero();
+      Eigen::Vector3d b = Eigen::Vector3d::Zero();
+      for (size_t i = 0; i < first.size(); ++i) {
+        const Residual e = street.residual(i, way);
+        const Eigen::Matrix2d W = information(e);
+        const double weight = 1.0 / (1.0 + 4.0 * e.r.dot(W * e.r) / (factor * factor * gate * gate));
+        H += weight * e.J.transpose() * W * e.J;
+        b -= weight * e.J.rightCols<3>().transpose() * W * e.r;
+      }
+      const Eigen::Vector3d turn = H.bottomRightCorner<3, 3>().ldlt().solve(b);
+      if (!turn.allFinite()) return std::nullopt;
+      way.T_first_second.q = (way.T_first_second.q * exp_q(turn)).normalized();
+    }
+  }
+  H.setZero();
+  int inliers = 0;
+  double depth_information = 0.0, depth_b = 0.0;  // of one inverse depth for all
+  for (size_t i = 0; i < first.size(); ++i) {
+    const Residual e = street.residual(i, way);
+    const Eigen::Matrix2d W = information(e);
+    way.inlier.push_back(e.r.dot(W * e.r) < gate * gate);
+    if (!way.inlier.back()) continue;
+    H += e.J.transpose() * W * e.J;
+    depth_information += e.g.squaredNorm();
+    depth_b += e.g.dot(kInverseDepth * e.g - e.r);
+    ++inliers;
+  }
+  if (inliers < config.min_inliers || 2 * inliers < static_cast<int>(first.size())) return std::nullopt;
+  if (depth_b < -kBackwards * std::sqrt(depth_information)) return std::nullopt;
+  const Eigen::Matrix3d cov_turn = H.bottomRightCorner<3, 3>().inverse();
+  const Eigen::Matrix<double, 3, 2> by_direction = -cov_turn * H.bottomLeftCorner<3, 2>();
+  const double direction2 = kAheadSigma * kAheadSigma;
+  way.cov << direction2 * Eigen::Matrix2d::Identity(), direction2 * by_direction.transpose(), direction2 * by_direction,
+      cov_turn + 2.0 * direction2 * by_direction * by_direction.transpose();
+  if (!way.cov.allFinite()) return std::nullopt;
+  return way;
+}
+
+}  // namespace roadfix

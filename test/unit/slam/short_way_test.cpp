@@ -1,0 +1,111 @@
+/// A way of centimetres from tracks without points: is it where it says, as well as it says?
+#include "slam/short_way.h"
+
+#include <catch2/catch.hpp>
+#include <cstdio>
+#include <random>
+
+#include "geometry/so3.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kFocal = 460.0, kSigma_px = 0.4;
+
+struct Seen {
+  std::vector<Eigen::Vector2d> first, second;
+  SE3 T_first_second;
+};
+
+/// A street from two poses, `length` m apart: a hundred tracks, one in `wrong_of` of them of something else.
+Seen street(unsigned seed, double length, int wrong_of) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto noise = [&]() -> Eigen::Vector2d {
+    const double x = normal(random), y = normal(random);
+    return kSigma_px / kFocal * Eigen::Vector2d(x, y);
+  };
+  const auto draw = [&](double sigma) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
+  };
+  Seen seen;
+  const Eigen::Vector3d aside = draw(0.2);
+  const Eigen::Vector3d direction = exp_so3({aside.x(), aside.y(), 0.0}) * Eigen::Vector3d::UnitZ();
+  seen.T_first_second = {exp_q(draw(0.01)), length * direction};
+  const SE3 T_second_first = seen.T_first_second.inverse();
+  while (seen.first.size() < 100) {
+    const double side = unit(random) < 0.5 ? -1.0 : 1.0;
+    const double x = side * (3.0 + 8.0 * unit(random)), y = 1.5 - 6.0 * unit(random), z = 4.0 + 36.0 * unit(random);
+    const Eigen::Vector3d p(x, y, z);
+    if (std::abs(x) > z) continue;
+    const bool wrong = static_cast<int>(seen.first.size()) % wrong_of == 0;
+    const Eigen::Vector3d q = T_second_first * p + (wrong ? draw(1.0) : Eigen::Vector3d::Zero());
+    seen.first.emplace_back(p.hnormalized() + noise());
+    seen.second.emplace_back(q.hnormalized() + noise());
+  }
+  return seen;
+}
+
+constexpr double kLengthSigma = 0.005;
+
+std::optional<ShortWay> solve(const Seen& seen, double length) {
+  return short_way(seen.first, seen.second, length, kLengthSigma, Eigen::Quaterniond::Identity(),
+                   {kFocal, kSigma_px, 2.0, 35});
+}
+
+/// Mean squared error over claimed covariance, of 50 ways.
+struct Consistency {
+  double nees = 0.0, too_long = 0.0;  ///< per number; the same where the length told is 20 % too long
+  double turn = 0.0;                  ///< rad, rms of what is found
+};
+
+Consistency consistency(double length) {
+  constexpr int kWays = 50;
+  Consistency c;
+  for (unsigned seed = 1; seed <= kWays; ++seed) {
+    const Seen seen = street(seed, length, 10);
+    std::mt19937 random(1000 + seed);
+    const double told = length + std::normal_distribution<double>(0.0, kLengthSigma)(random);
+    const auto nees = [&](const ShortWay& way) {
+      const Vector6d d = local(way.T_first_second, seen.T_first_second);
+      return d.dot(way.cov_pose(kLengthSigma).ldlt().solve(d)) / 6.0 / kWays;
+    };
+    const auto way = solve(seen, told), too_long = solve(seen, 1.2 * told);
+    REQUIRE(way);
+    REQUIRE(too_long);
+    c.nees += nees(*way);
+    c.too_long += nees(*too_long);
+    c.turn += log_q(way->T_first_second.q.conjugate() * seen.T_first_second.q).squaredNorm() / kWays;
+  }
+  c.turn = std::sqrt(c.turn);
+  return c;
+}
+
+TEST_CASE("a short way from tracks without points is where it says, as well as it says") {
+  for (const double length : {0.02, 0.1, 0.3, 0.6}) {
+    const Consistency c = consistency(length);
+    std::printf("short way of %.2f m: NEES %.2f (%.1f too long), turn %.4f rad\n", length, c.nees, c.too_long, c.turn);
+    CAPTURE(length);
+    CHECK(c.nees > 0.4);  // 50 ways of six numbers: 0.08 uncertain, and what is not known is taken for large
+    CHECK(c.nees < 1.27);
+    if (length > 0.05) CHECK(c.too_long > 1.27);  // teeth
+    CHECK(c.turn < 0.01);                         // drawn: 0.017
+  }
+}
+
+TEST_CASE("a car that backs out is not told to go forwards") {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    CHECK_FALSE(solve(street(seed, -0.1, 10), 0.1));
+    CHECK(solve(street(seed, 0.1, 10), 0.1));  // teeth
+  }
+}
+
+TEST_CASE("tracks that do not agree are no way") {
+  CHECK_FALSE(solve(street(3, 0.3, 1), 0.3));
+  CHECK(solve(street(3, 0.3, 4), 0.3));
+}
+
+}  // namespace
+}  // namespace roadfix
