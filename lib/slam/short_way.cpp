@@ -26,36 +26,20 @@ Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& direction) {
   return B;
 }
 
-/// (M.7b) of one track and its derivatives.
-struct Residual {
-  Eigen::Vector2d r;
-  Eigen::Matrix<double, 2, 5> J;  ///< by direction and turn
-  Eigen::Vector2d g;              ///< by inverse depth
-};
-
 /// The way told as it is used to explain the tracks: at least what it is doubted by.
 struct Street {
   std::span<const Eigen::Vector2d> first, second;
   double length, sigma;
   Eigen::Vector3d ahead;
 
-  [[nodiscard]] Residual residual(size_t i, const ShortWay& way) const {
-    const Eigen::Matrix3d R_second_first = way.T_first_second.q.conjugate().toRotationMatrix();
-    const Eigen::Vector3d moved = first[i].homogeneous() - kInverseDepth * length * ahead;
-    const Eigen::Vector3d p = R_second_first * moved;
-    const double z = std::max(kMinDepthShare, p.z());
-    Eigen::Matrix<double, 2, 3> J_point;
-    J_point << 1.0 / z, 0.0, -p.x() / (z * z), 0.0, 1.0 / z, -p.y() / (z * z);
-    Residual out;
-    out.r = (p.head<2>() / z - second[i]) / sigma;
-    out.J << -kInverseDepth * length * J_point * R_second_first * way.across / sigma, J_point * skew(p) / sigma;
-    out.g = -length * J_point * R_second_first * ahead / sigma;
-    return out;
+  [[nodiscard]] ShortWayResidual residual(size_t i, const ShortWay& way) const {
+    return short_way_residual(first[i], second[i], way.T_first_second.q, length * ahead, way.across, kInverseDepth,
+                              sigma);
   }
 };
 
 /// What a track tells of the turn, its inverse depth and what that and the direction move it by together unknown.
-Eigen::Matrix2d information(const Residual& e) {
+Eigen::Matrix2d information(const ShortWayResidual& e) {
   const Eigen::Vector2d along = kInverseDepth * e.g;
   const Eigen::Matrix2d aside = kAheadSigma * e.J.leftCols<2>();
   const Eigen::Matrix2d cov = Eigen::Matrix2d::Identity() + along * along.transpose() + aside * aside.transpose();
@@ -63,6 +47,21 @@ Eigen::Matrix2d information(const Residual& e) {
 }
 
 }  // namespace
+
+ShortWayResidual short_way_residual(const Eigen::Vector2d& first, const Eigen::Vector2d& second,
+                                    const Eigen::Quaterniond& q, const Eigen::Vector3d& way,
+                                    const Eigen::Matrix<double, 3, 2>& across, double inverse_depth, double sigma) {
+  const Eigen::Matrix3d R_second_first = q.conjugate().toRotationMatrix();
+  const Eigen::Vector3d p = R_second_first * (first.homogeneous() - inverse_depth * way);
+  const double z = std::max(kMinDepthShare, p.z());
+  Eigen::Matrix<double, 2, 3> J_point;
+  J_point << 1.0 / z, 0.0, -p.x() / (z * z), 0.0, 1.0 / z, -p.y() / (z * z);
+  ShortWayResidual out;
+  out.r = (p.head<2>() / z - second) / sigma;
+  out.J << -inverse_depth * way.norm() * J_point * R_second_first * across / sigma, J_point * skew(p) / sigma;
+  out.g = -J_point * R_second_first * way / sigma;
+  return out;
+}
 
 Matrix6d ShortWay::cov_pose(double length_sigma) const {
   const double length = T_first_second.p.norm();
@@ -90,7 +89,7 @@ std::optional<ShortWay> short_way(std::span<const Eigen::Vector2d> first, std::s
       H.setZero();
       Eigen::Vector3d b = Eigen::Vector3d::Zero();
       for (size_t i = 0; i < first.size(); ++i) {
-        const Residual e = street.residual(i, way);
+        const ShortWayResidual e = street.residual(i, way);
         const Eigen::Matrix2d W = information(e);
         const double weight = 1.0 / (1.0 + 4.0 * e.r.dot(W * e.r) / (factor * factor * gate * gate));
         H += weight * e.J.transpose() * W * e.J;
@@ -105,7 +104,7 @@ std::optional<ShortWay> short_way(std::span<const Eigen::Vector2d> first, std::s
   int inliers = 0;
   double depth_information = 0.0, depth_b = 0.0;  // of one inverse depth for all
   for (size_t i = 0; i < first.size(); ++i) {
-    const Residual e = street.residual(i, way);
+    const ShortWayResidual e = street.residual(i, way);
     const Eigen::Matrix2d W = information(e);
     way.inlier.push_back(e.r.dot(W * e.r) < gate * gate);
     if (!way.inlier.back()) continue;

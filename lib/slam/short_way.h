@@ -28,6 +28,19 @@ struct ShortWay {
   [[nodiscard]] Matrix6d cov_pose(double length_sigma) const;
 };
 
+/// (M.7b) of one track, in sigmas, and its derivatives.
+struct ShortWayResidual {
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 5> J;  ///< by the direction, along `across`, and by the turn, q exp(d)
+  Eigen::Vector2d g;              ///< by inverse depth, m
+};
+
+/// `first`, `second`: the track, normalised; `q`: turn from the first picture to the second; `way`: m, in the first's
+/// axes; `sigma`: of the difference.
+ShortWayResidual short_way_residual(const Eigen::Vector2d& first, const Eigen::Vector2d& second,
+                                    const Eigen::Quaterniond& q, const Eigen::Vector3d& way,
+                                    const Eigen::Matrix<double, 3, 2>& across, double inverse_depth, double sigma);
+
 /// Normalised coordinates of the same tracks in both pictures; `length`, m, that the camera has gone; `q_start` is the
 /// turn that is expected. Nothing where the tracks do not agree, or go the other way.
 std::optional<ShortWay> short_way(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second,

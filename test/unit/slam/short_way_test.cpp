@@ -102,6 +102,37 @@ TEST_CASE("a car that backs out is not told to go forwards") {
   }
 }
 
+TEST_CASE("a short way's derivatives are the numerical ones") {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const auto draw = [&](double sigma) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
+  };
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector2d first = draw(0.3).head<2>(), second = draw(0.3).head<2>();
+    const Eigen::Quaterniond q = exp_q(draw(0.1));
+    const Eigen::Vector3d direction = (Eigen::Vector3d::UnitZ() + draw(0.1)).normalized();
+    Eigen::Matrix<double, 3, 2> across;
+    across.col(0) = direction.unitOrthogonal();
+    across.col(1) = direction.cross(across.col(0));
+    const double length = 0.6, depth = 0.1, sigma = 0.001, h = 1e-6;
+    // d: direction (2), turn (3), inverse depth
+    const auto at = [&](const Vector6d& d) {
+      const Eigen::Vector3d way = length * (direction + across * d.head<2>());
+      return short_way_residual(first, second, q * exp_q(d.segment<3>(2)), way, across, depth + d(5), sigma).r;
+    };
+    const ShortWayResidual e = short_way_residual(first, second, q, length * direction, across, depth, sigma);
+    Eigen::Matrix<double, 2, 6> J, numerical;
+    J << e.J, e.g;
+    for (int k = 0; k < 6; ++k) {
+      const Vector6d d = h * Vector6d::Unit(k);
+      numerical.col(k) = (at(d) - at(-d)) / (2.0 * h);
+    }
+    CHECK((J - numerical).norm() < 1e-6 * J.norm());
+  }
+}
+
 TEST_CASE("tracks that do not agree are no way") {
   CHECK_FALSE(solve(street(3, 0.3, 1), 0.3));
   CHECK(solve(street(3, 0.3, 4), 0.3));
