@@ -1,5 +1,7 @@
 #include "roadfix/stages.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 
@@ -43,7 +45,7 @@ std::vector<std::unique_ptr<Stage>> make_stages(const std::vector<std::string>& 
   for (const std::string& name : names) {
     const std::vector<std::string> known = stage_names();
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      throw std::runtime_error("--stages: there is no stage '" + name + "' (there are " + all + ")");
+      throw std::runtime_error(fmt::format("--stages: there is no stage '{}' (there are {})", name, all));
     }
     if (std::count(names.begin(), names.end(), name) > 1) {
       throw std::runtime_error("--stages: '" + name + "' stands there twice");

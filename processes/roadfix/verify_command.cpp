@@ -54,7 +54,7 @@ void run_verify(const VerifyArguments& arguments) {
       print_list("not for this vehicle", {name + ": " + e.what()});
       continue;
     }
-    stages.push_back([name, &arguments] { return std::move(make_stages({name}, arguments.config).front()); });
+    stages.emplace_back([name, &arguments] { return std::move(make_stages({name}, arguments.config).front()); });
   }
   const VerifyReport report = verify({arguments.logs.begin(), arguments.logs.end()}, stages);
   print_list("damaged", report.log_damage);
