@@ -4,7 +4,23 @@ namespace roadfix {
 namespace {
 
 constexpr int kLens = LensCorrection::kSize;
-constexpr double kMinPointInformation = 1e-9;  ///< keeps a point without parallax where it is
+constexpr double kMinPointInformation = 1e-9;               ///< keeps a point without parallax where it is
+constexpr double kViewKnown = 100.0, kViewTurnKnown = 1.0;  ///< m, rad: of a view that nothing ties to the others
+
+/// For a lower triangle or a whole matrix: `rows` of views.
+void add_view_information(Eigen::MatrixXd& H, int rows) {
+  for (int row = 0; row < rows; row += 6) {
+    H.diagonal().segment<3>(row).array() += 1.0 / (kViewKnown * kViewKnown);
+    H.diagonal().segment<3>(row + 3).array() += 1.0 / (kViewTurnKnown * kViewTurnKnown);
+  }
+}
+
+/// F with F F' = A, for a symmetric A without negative directions but those of round-off.
+Eigen::MatrixXd square_root(const Eigen::MatrixXd& A) {
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(A);
+  const Eigen::MatrixXd L = ldlt.matrixL();
+  return ldlt.transpositionsP().transpose() * (L * ldlt.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal());
+}
 
 }  // namespace
 
@@ -152,6 +168,7 @@ size_t NormalEquations::add_scores(Eigen::MatrixXd& lower, Factor factor) const 
 Eigen::MatrixXd NormalEquations::covariance() const {
   Reduced r = reduce(0.0);
   add_scores(r.S, [](const Point& point) { return -point.bend; });
+  add_view_information(r.S, lens_row_);
   const Eigen::Index n = r.S.rows();
   return r.S.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(n, n));
 }
@@ -159,12 +176,13 @@ Eigen::MatrixXd NormalEquations::covariance() const {
 Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& covariance) const {
   // What is known beside the pictures has the scatter that its information says.
   Eigen::MatrixXd scatter = H_known_;
+  add_view_information(scatter, lens_row_);
   const size_t clusters = add_scores(scatter, [](const Point&) { return 1.0; });
   // The fit has taken its own share out of the residuals. A track whose errors are all alike still brings two numbers.
   const auto n = 2.0 * static_cast<double>(clusters), unknowns = static_cast<double>(scatter.rows());
   const double shrunk = n > 2.0 * unknowns ? n / (n - unknowns) : 2.0;
-  const Eigen::MatrixXd whole = scatter.selfadjointView<Eigen::Lower>();
-  return shrunk * covariance * whole * covariance;
+  const Eigen::MatrixXd draws = covariance * square_root(scatter.selfadjointView<Eigen::Lower>());
+  return shrunk * draws * draws.transpose();  // a square: no variance is negative, whatever was rounded
 }
 
 }  // namespace roadfix

@@ -1,5 +1,6 @@
 #include "slam/bundle.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
 
@@ -151,6 +152,35 @@ TEST_CASE("the clustered covariance is that of errors alike along a track, whate
     CHECK(nees.clustered < 1.35);  // and what 120 clusters leave uncertain of the covariance itself
   }
   CHECK(wandering.plain > 2.0);  // teeth: what the covariance of independent errors makes of it
+}
+
+/// Some views see points of their own alone: nothing ties them to the others.
+void cut_off_from(int first_view, BundleProblem& problem) {
+  const auto shared = static_cast<int>(problem.points.size());
+  for (int p = 0; p < shared; ++p) problem.points.emplace_back(problem.points[static_cast<size_t>(p)]);
+  for (auto& o : problem.observations) o.point += o.view >= first_view ? shared : 0;
+  std::stable_sort(problem.observations.begin(), problem.observations.end(),
+                   [](const auto& a, const auto& b) { return a.point < b.point; });
+}
+
+TEST_CASE("the covariance of views that nothing ties to the others is one, and wide") {
+  for (const bool stereo : {false, true}) {
+    for (unsigned seed = 0; seed < 20; ++seed) {
+      Scene s = make_scene(700 + seed, stereo, 0.5, 0.02);
+      const auto last = static_cast<int>(s.problem.views.size()) - 1;
+      s.problem.distances.push_back({last - 1, last, 1.0, 0.01});
+      BundleProblem tied = s.problem;
+      cut_off_from(stereo && seed % 2 == 0 ? last : last - 1, s.problem);
+      const auto eigenvalues = [](BundleProblem& problem) -> Vector6d {
+        return Eigen::SelfAdjointEigenSolver<Matrix6d>(adjust(problem, 5).clustered_cov_last).eigenvalues();
+      };
+      const Vector6d cut = eigenvalues(s.problem), whole = eigenvalues(tied);
+      CHECK(cut(0) > 0.0);
+      CHECK(std::sqrt(cut(5)) > 5.0);  // m
+      CHECK(std::sqrt(cut(5)) < 500.0);
+      CHECK(std::sqrt(whole(5)) < 0.5);  // teeth: the same pictures with the ties left
+    }
+  }
 }
 
 TEST_CASE("a wrong focal length and a turned right eye are found") {
