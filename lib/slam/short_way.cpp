@@ -18,26 +18,6 @@ constexpr double kMinDepthShare = 0.2;  ///< of a point's depth that is left whe
 
 using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
-/// Two axes across a direction.
-Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& direction) {
-  Eigen::Matrix<double, 3, 2> B;
-  B.col(0) = direction.unitOrthogonal();
-  B.col(1) = direction.cross(B.col(0));
-  return B;
-}
-
-/// The way told as it is used to explain the tracks: at least what it is doubted by.
-struct Street {
-  std::span<const Eigen::Vector2d> first, second;
-  double length, sigma;
-  Eigen::Vector3d ahead;
-
-  [[nodiscard]] ShortWayResidual residual(size_t i, const ShortWay& way) const {
-    return short_way_residual(first[i], second[i], way.T_first_second.q, length * ahead, way.across, kInverseDepth,
-                              sigma);
-  }
-};
-
 /// What a track tells of the turn, its inverse depth and what that and the direction move it by together unknown.
 Eigen::Matrix2d information(const ShortWayResidual& e) {
   const Eigen::Vector2d along = kInverseDepth * e.g;
@@ -47,6 +27,13 @@ Eigen::Matrix2d information(const ShortWayResidual& e) {
 }
 
 }  // namespace
+
+Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& direction) {
+  Eigen::Matrix<double, 3, 2> B;
+  B.col(0) = direction.unitOrthogonal();
+  B.col(1) = direction.cross(B.col(0));
+  return B;
+}
 
 ShortWayResidual short_way_residual(const Eigen::Vector2d& first, const Eigen::Vector2d& second,
                                     const Eigen::Quaterniond& q, const Eigen::Vector3d& way,
@@ -81,15 +68,19 @@ std::optional<ShortWay> short_way(std::span<const Eigen::Vector2d> first, std::s
                                   const ShortWayConfig& config) {
   const double sigma = std::sqrt(2.0) * config.sigma_px / config.focal_px;  // both pictures'
   const double gate = config.gate_px / config.sigma_px;
-  const Street street{first, second, std::hypot(length, length_sigma), sigma, config.ahead};
+  // The way told as it is used to explain the tracks: at least what it is doubted by.
+  const Eigen::Vector3d ahead = std::hypot(length, length_sigma) * config.ahead;
   ShortWay way{{q_start, length * config.ahead}, axes_across(config.ahead), {}, {}};
+  const auto residual = [&](size_t i) {
+    return short_way_residual(first[i], second[i], way.T_first_second.q, ahead, way.across, kInverseDepth, sigma);
+  };
   Matrix5d H;
   for (const double factor : kGateFactor) {
     for (int step = 0; step < kStepsPerRound; ++step) {
       H.setZero();
       Eigen::Vector3d b = Eigen::Vector3d::Zero();
       for (size_t i = 0; i < first.size(); ++i) {
-        const ShortWayResidual e = street.residual(i, way);
+        const ShortWayResidual e = residual(i);
         const Eigen::Matrix2d W = information(e);
         const double weight = 1.0 / (1.0 + 4.0 * e.r.dot(W * e.r) / (factor * factor * gate * gate));
         H += weight * e.J.transpose() * W * e.J;
@@ -104,7 +95,7 @@ std::optional<ShortWay> short_way(std::span<const Eigen::Vector2d> first, std::s
   int inliers = 0;
   double depth_information = 0.0, depth_b = 0.0;  // of one inverse depth for all
   for (size_t i = 0; i < first.size(); ++i) {
-    const ShortWayResidual e = street.residual(i, way);
+    const ShortWayResidual e = residual(i);
     const Eigen::Matrix2d W = information(e);
     way.inlier.push_back(e.r.dot(W * e.r) < gate * gate);
     if (!way.inlier.back()) continue;

@@ -20,13 +20,16 @@ struct ShortWayConfig {
 
 struct ShortWay {
   SE3 T_first_second;                  ///< as long as told
-  Eigen::Matrix<double, 3, 2> across;  ///< two axes across the way, in the first picture's
+  Eigen::Matrix<double, 3, 2> across;  ///< axes_across() the way, in the first picture's
   Eigen::Matrix<double, 5, 5> cov;     ///< rad2, of the direction along `across`, of the turn in the second's axes
   std::vector<bool> inlier;            ///< one per pair
 
   /// Of retract(T_first_second, d).
   [[nodiscard]] Matrix6d cov_pose(double length_sigma) const;
 };
+
+/// Two axes across a direction, all of unit length; the direction is the first times the second.
+Eigen::Matrix<double, 3, 2> axes_across(const Eigen::Vector3d& direction);
 
 /// (M.7b) of one track, in sigmas, and its derivatives.
 struct ShortWayResidual {

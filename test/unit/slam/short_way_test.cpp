@@ -17,23 +17,22 @@ struct Seen {
   SE3 T_first_second;
 };
 
+/// Three numbers of this sigma.
+Eigen::Vector3d draw(std::mt19937& random, double sigma) {
+  std::normal_distribution<double> normal(0.0, sigma);
+  const double x = normal(random), y = normal(random), z = normal(random);
+  return {x, y, z};
+}
+
 /// A street from two poses, `length` m apart: a hundred tracks, one in `wrong_of` of them of something else.
 Seen street(unsigned seed, double length, int wrong_of) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, 1.0);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  const auto noise = [&]() -> Eigen::Vector2d {
-    const double x = normal(random), y = normal(random);
-    return kSigma_px / kFocal * Eigen::Vector2d(x, y);
-  };
-  const auto draw = [&](double sigma) {
-    const double x = normal(random), y = normal(random), z = normal(random);
-    return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
-  };
+  const auto noise = [&]() -> Eigen::Vector2d { return draw(random, kSigma_px / kFocal).head<2>(); };
   Seen seen;
-  const Eigen::Vector3d aside = draw(0.2);
+  const Eigen::Vector3d aside = draw(random, 0.2);
   const Eigen::Vector3d direction = exp_so3({aside.x(), aside.y(), 0.0}) * Eigen::Vector3d::UnitZ();
-  seen.T_first_second = {exp_q(draw(0.01)), length * direction};
+  seen.T_first_second = {exp_q(draw(random, 0.01)), length * direction};
   const SE3 T_second_first = seen.T_first_second.inverse();
   while (seen.first.size() < 100) {
     const double side = unit(random) < 0.5 ? -1.0 : 1.0;
@@ -41,7 +40,7 @@ Seen street(unsigned seed, double length, int wrong_of) {
     const Eigen::Vector3d p(x, y, z);
     if (std::abs(x) > z) continue;
     const bool wrong = static_cast<int>(seen.first.size()) % wrong_of == 0;
-    const Eigen::Vector3d q = T_second_first * p + (wrong ? draw(1.0) : Eigen::Vector3d::Zero());
+    const Eigen::Vector3d q = T_second_first * p + (wrong ? draw(random, 1.0) : Eigen::Vector3d::Zero());
     seen.first.emplace_back(p.hnormalized() + noise());
     seen.second.emplace_back(q.hnormalized() + noise());
   }
@@ -104,18 +103,11 @@ TEST_CASE("a car that backs out is not told to go forwards") {
 
 TEST_CASE("a short way's derivatives are the numerical ones") {
   std::mt19937 random(5);
-  std::normal_distribution<double> normal(0.0, 1.0);
-  const auto draw = [&](double sigma) {
-    const double x = normal(random), y = normal(random), z = normal(random);
-    return Eigen::Vector3d(sigma * x, sigma * y, sigma * z);
-  };
   for (int i = 0; i < 20; ++i) {
-    const Eigen::Vector2d first = draw(0.3).head<2>(), second = draw(0.3).head<2>();
-    const Eigen::Quaterniond q = exp_q(draw(0.1));
-    const Eigen::Vector3d direction = (Eigen::Vector3d::UnitZ() + draw(0.1)).normalized();
-    Eigen::Matrix<double, 3, 2> across;
-    across.col(0) = direction.unitOrthogonal();
-    across.col(1) = direction.cross(across.col(0));
+    const Eigen::Vector2d first = draw(random, 0.3).head<2>(), second = draw(random, 0.3).head<2>();
+    const Eigen::Quaterniond q = exp_q(draw(random, 0.1));
+    const Eigen::Vector3d direction = (Eigen::Vector3d::UnitZ() + draw(random, 0.1)).normalized();
+    const Eigen::Matrix<double, 3, 2> across = axes_across(direction);
     const double length = 0.6, depth = 0.1, sigma = 0.001, h = 1e-6;
     // d: direction (2), turn (3), inverse depth
     const auto at = [&](const Vector6d& d) {
