@@ -129,10 +129,12 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
   for (const BundleProblem::Distance& d : problem.distances) {
     const Eigen::Vector3d between = separation(problem, d);
     const double length = between.norm(), residual = (d.distance - length) / d.sigma;
-    result.cost += 0.5 * residual * residual;
+    const double huber = d.measured ? problem.huber : std::numeric_limits<double>::infinity();
+    const double root_weight = std::sqrt(robust_weight(residual * residual, huber));
+    result.cost += robust_cost(residual * residual, huber);
     if (length < kMinSeparation) continue;
     result.equations.add_distance(free[static_cast<size_t>(d.view_a)], free[static_cast<size_t>(d.view_b)],
-                                  between / (length * d.sigma), residual);
+                                  root_weight * between / (length * d.sigma), root_weight * residual);
   }
   return result;
 }

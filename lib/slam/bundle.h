@@ -29,6 +29,7 @@ struct BundleProblem {
     int view_b = 0;
     double distance = 0.0;
     double sigma = 0.0;
+    bool measured = false;  ///< and may be far off, as a wheel slips: counts linearly beyond `huber` sigmas
   };
 
   std::vector<View> views;

@@ -114,7 +114,7 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
     if (i == 0) continue;
     const int view = static_cast<int>(i);
     if (const auto way = travel(keyframes_[i - 1], k)) {
-      problem.distances.push_back({view - 1, view, way->distance, std::max(kMinTravelSigma, way->sigma)});
+      problem.distances.push_back({view - 1, view, way->distance, std::max(kMinTravelSigma, way->sigma), true});
     } else if (k.held_distance) {
       problem.distances.push_back({view - 1, view, *k.held_distance, kUnitHold * *k.held_distance});
     }

@@ -168,7 +168,7 @@ TEST_CASE("the covariance of views that nothing ties to the others is one, and w
     for (unsigned seed = 0; seed < 20; ++seed) {
       Scene s = make_scene(700 + seed, stereo, 0.5, 0.02);
       const auto last = static_cast<int>(s.problem.views.size()) - 1;
-      s.problem.distances.push_back({last - 1, last, 1.0, 0.01});
+      s.problem.distances.push_back({last - 1, last, 1.0, 0.01, true});
       BundleProblem tied = s.problem;
       cut_off_from(stereo && seed % 2 == 0 ? last : last - 1, s.problem);
       const auto eigenvalues = [](BundleProblem& problem) -> Vector6d {
@@ -204,6 +204,24 @@ TEST_CASE("a distance between views gives mono its scale") {
   (void)adjust(s.problem, 50);
   const double scale = s.problem.views[5].T_map_camera.p.norm() / s.true_views[5].p.norm();
   CHECK(scale == Approx(2.0).epsilon(0.01));
+}
+
+TEST_CASE("one wrong distance of several tears no view from its place") {
+  const auto error = [](double times, bool measured) {
+    Scene s = make_scene(13, false, 0.3, 0.02);
+    for (int v = 1; v < 6; ++v) {
+      const double true_m =
+          (s.true_views[static_cast<size_t>(v)].p - s.true_views[static_cast<size_t>(v) - 1].p).norm();
+      s.problem.distances.push_back({v - 1, v, v == 4 ? times * true_m : true_m, 0.01, measured});
+    }
+    (void)adjust(s.problem, 30);
+    return worst_position_error(s);
+  };
+  for (const double times : {0.2, 1.3, 5.0}) {
+    CHECK(error(times, true) < 0.05);
+    CHECK(error(times, false) > 0.1);  // teeth
+  }
+  CHECK(error(1.0, true) < 1.1 * error(1.0, false));
 }
 
 }  // namespace
