@@ -166,7 +166,7 @@ std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, VoNoise noise
   return events;
 }
 
-std::vector<StreamEvent> merged(std::vector<std::vector<StreamEvent>> streams) {
+std::vector<StreamEvent> merged(const std::vector<std::vector<StreamEvent>>& streams) {
   std::vector<StreamEvent> all;
   for (const auto& s : streams) all.insert(all.end(), s.begin(), s.end());
   std::stable_sort(all.begin(), all.end(), [](const StreamEvent& a, const StreamEvent& b) {

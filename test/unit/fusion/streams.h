@@ -51,7 +51,7 @@ std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& n
 std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, VoNoise noise, std::uint64_t seed);
 
 /// In the order of time, GNSS/INS first.
-std::vector<StreamEvent> merged(std::vector<std::vector<StreamEvent>> streams);
+std::vector<StreamEvent> merged(const std::vector<std::vector<StreamEvent>>& streams);
 
 /// Called after each sample.
 using OnFused = std::function<void(const Fusion&, const StreamEvent&)>;

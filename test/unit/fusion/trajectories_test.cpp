@@ -32,7 +32,8 @@ Path3d load(const std::filesystem::path& folder, const std::string& drive, const
   const auto times = rows_of(folder / (drive + "_times.txt")), truth = rows_of(folder / (drive + "_reference.txt"));
   Path3d path;
   std::size_t frame = 0;
-  for (const std::vector<double>& row : rows_of(folder / (drive + "_" + odometry + ".txt"))) {
+  const auto rows = rows_of(folder / (drive + "_" + odometry + ".txt"));
+  for (const std::vector<double>& row : rows) {
     const std::size_t first = row.size() - 12;
     if (first == 1) frame = static_cast<std::size_t>(row[0]);
     path.times.push_back(times.at(frame).at(0));
