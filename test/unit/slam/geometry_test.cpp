@@ -160,9 +160,9 @@ TEST_CASE("two views give the motion, and refuse turning on the spot") {
   std::vector<Eigen::Vector2d> first, second, turned;
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d p = some_point(random);
-    first.push_back(p.hnormalized());
-    second.push_back((T_first_second.inverse() * p).hnormalized());
-    turned.push_back((T_first_second.q.conjugate() * p).hnormalized());
+    first.emplace_back(p.hnormalized());
+    second.emplace_back((T_first_second.inverse() * p).hnormalized());
+    turned.emplace_back((T_first_second.q.conjugate() * p).hnormalized());
     if (i % 5 == 0) second.back().y() += 0.05;
   }
   TwoViewConfig config;

@@ -161,7 +161,7 @@ struct Dark {
   int unannounced = 0;       ///< valid frames after the loss that count no jump
 };
 
-Dark into_the_dark(ScenarioConfig config, double light_s) {
+Dark into_the_dark(const ScenarioConfig& config, double light_s) {
   TrackConfig tracks;
   tracks.moving_cars = false;  // their lamps can be seen in the dark, and are no landmarks
   const test::TrackDrive d = test::make_track_drive(config, 1, tracks);

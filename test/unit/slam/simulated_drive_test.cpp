@@ -54,7 +54,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
   StreetPlan plan;
   for (int i = -10; i < kFrames + 60; ++i) {
     const SE3 T = true_pose(std::clamp(i, 0, kFrames), seed);
-    plan.driven.push_back(T.p + (i - std::clamp(i, 0, kFrames)) * (T.q * Eigen::Vector3d::UnitX()));
+    plan.driven.emplace_back(T.p + (i - std::clamp(i, 0, kFrames)) * (T.q * Eigen::Vector3d::UnitX()));
   }
   plan.segments = {{0.0, StreetKind::kStreet}};
   plan.seed = seed;
