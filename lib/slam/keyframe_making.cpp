@@ -174,8 +174,11 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
 
 void KeyframeTracker::begin_bundle() {
   job_ = std::make_unique<BundleJob>(map_.make_bundle([this](const Keyframe& a, const Keyframe& b) {
-    const auto known = stereo_ ? std::nullopt : camera_travelled(a.t_us, a.T_map_camera, b.t_us, b.T_map_camera);
-    return known ? std::optional(known->travel) : std::nullopt;
+    if (stereo_ && !map_.one_eyed()) return std::optional<Travel>();
+    const auto known = camera_travelled(a.t_us, a.T_map_camera, b.t_us, b.T_map_camera);
+    if (!known) return std::optional<Travel>();
+    if (stereo_) scale_std_ = known->travel.scale_std;
+    return std::optional(known->travel);
   }));
   BundleJob* job = job_.get();
   const int iterations = config_.bundle_iterations;

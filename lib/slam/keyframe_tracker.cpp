@@ -231,7 +231,8 @@ void KeyframeTracker::settle(int64_t t_us, const SE3& T_map_camera, const Matrix
 
 /// What lengths and turns are known to, all along the way.
 SharedDoubt KeyframeTracker::shared_doubt() const {
-  if (stereo_) return rig_.doubt;
+  if (stereo_ && !map_.one_eyed()) return rig_.doubt;
+  if (stereo_) return {std::max(rig_.doubt.lengths, scale_std_), rig_.doubt.turns};
   return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, 0.0};  // mono's focal length is learnt
 }
 

@@ -8,21 +8,48 @@
 #include "slam/triangulation.h"
 
 namespace roadfix {
+namespace {
+
+constexpr int64_t kBlink = 3;  ///< keyframes without the right eye that are no loss of it
+
+/// Of the calibration before any picture. Two eyes tell depth by disparity, which every error of a lens resembles:
+/// there only the right eye's turn is learnt.
+LensCorrection::Matrix first_information(const KeyframeTrackerConfig& config, bool two_eyes) {
+  const auto information = [&](double sigma) { return config.alike_sightings / std::max(1e-12, sigma * sigma); };
+  LensCorrection::Vector diagonal;
+  diagonal << information(two_eyes ? 0.0 : config.focal_std), information(two_eyes ? 0.0 : config.radial_std),
+      Eigen::Vector3d::Constant(information(config.right_turn_std_deg * kDegree));
+  return diagonal.asDiagonal();
+}
+
+}  // namespace
 
 LocalMap::LocalMap(const CameraRig& rig, const KeyframeTrackerConfig& config)
-    : rig_(rig), config_(config), focal_px_(Camera(rig.left).focal()) {
-  const auto information = [this](double sigma) { return config_.alike_sightings / std::max(1e-12, sigma * sigma); };
-  // Two eyes tell depth by disparity, which every error of a lens resembles: there only the right eye's turn is learnt.
-  const bool stereo = rig.right.has_value();
-  LensCorrection::Vector diagonal;
-  diagonal << information(stereo ? 0.0 : config.focal_std), information(stereo ? 0.0 : config.radial_std),
-      Eigen::Vector3d::Constant(information(config.right_turn_std_deg * kDegree));
-  lens_information_ = diagonal.asDiagonal();
+    : rig_(rig),
+      config_(config),
+      focal_px_(Camera(rig.left).focal()),
+      lens_information_(first_information(config, rig.right.has_value())) {}
+
+/// Whoever has lost an eye is like mono: what turns tell of the lens counts, else they stretch the map. With both
+/// eyes the lens is what the calibration says, again.
+void LocalMap::count_eyes(std::span<const KeyframeFeature> features) {
+  if (!rig_.right) return;
+  const bool seen = std::any_of(features.begin(), features.end(), [](const auto& f) { return f.right.has_value(); });
+  without_right_ = seen ? 0 : without_right_ + 1;
+  if (one_eyed_ == (without_right_ >= kBlink)) return;
+  one_eyed_ = !one_eyed_;
+  constexpr int kLens = 2;  // focal length and radial distortion, the vector's first
+  lens_information_.topRows<kLens>().setZero();
+  lens_information_.leftCols<kLens>().setZero();
+  lens_information_.topLeftCorner<kLens, kLens>() =
+      first_information(config_, !one_eyed_).topLeftCorner<kLens, kLens>();
+  lens_prior_.value.head<kLens>().setZero();
 }
 
 int64_t LocalMap::add_keyframe(const Keyframe& keyframe, std::span<const KeyframeFeature> features) {
   keyframes_.push_back(keyframe);
   keyframes_.back().id = next_id_;
+  count_eyes(features);
   for (const KeyframeFeature& f : features) {
     landmarks_[f.track].sightings.push_back({next_id_, f.left, f.right});
   }
@@ -103,7 +130,8 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
   problem.focal_px = focal_px_;
   problem.sigma_px = config_.sigma_px;
   problem.track_freedom = config_.track_freedom;
-  problem.lens = problem.lens_prior = lens_;
+  problem.lens = lens_;
+  problem.lens_prior = lens_prior_;
   problem.lens_information = lens_information_;
   const size_t fixed = num_fixed();
   constexpr double kUnitHold = 1e-3;  // of the distance held: it is exact by definition
@@ -159,7 +187,7 @@ std::vector<int64_t> LocalMap::apply(const BundleJob& job) {
 }
 
 void LocalMap::learn_lens(const BundleJob& job) {
-  lens_ = job.problem.lens;
+  lens_ = lens_prior_ = job.problem.lens;
   // What this window added. The next windows share most of it: each counts for its share only, (M.15).
   const double share = 1.0 / static_cast<double>(job.keyframes.size());
   const LensCorrection::Matrix added = job.report.lens_cov.inverse() - job.problem.lens_information;
@@ -190,7 +218,8 @@ void LocalMap::move(const SE3& T) {
 
 template <class Map, class Archive>
 void LocalMap::members(Map& self, Archive& archive) {
-  archive(self.next_id_, self.lens_.value, self.lens_information_, self.keyframes_, self.landmarks_);
+  archive(self.next_id_, self.lens_.value, self.lens_prior_.value, self.lens_information_, self.keyframes_,
+          self.landmarks_, self.without_right_, self.one_eyed_);
 }
 
 void LocalMap::save(StateWriter& writer) const {

@@ -96,11 +96,14 @@ class LocalMap {
   [[nodiscard]] const Landmark* find(int64_t track) const;
   [[nodiscard]] const LensCorrection& lens() const { return lens_; }
   [[nodiscard]] int64_t num_keyframes_ever() const { return next_id_; }
+  /// A rig of two eyes of which the right one has not been there for the last keyframes: a camera like mono's.
+  [[nodiscard]] bool one_eyed() const { return one_eyed_; }
 
  private:
   template <class Map, class Archive>
   static void members(Map& self, Archive& archive);
   void make_points();
+  void count_eyes(std::span<const KeyframeFeature> features);
   void learn_lens(const BundleJob& job);
   void forget_old_keyframes();
   [[nodiscard]] const Keyframe* keyframe(int64_t id) const;
@@ -115,7 +118,10 @@ class LocalMap {
   std::map<int64_t, Landmark> landmarks_;
   int64_t next_id_ = 0;
   LensCorrection lens_;
+  LensCorrection lens_prior_;  ///< its mean before the next adjustment
   LensCorrection::Matrix lens_information_;
+  int64_t without_right_ = 0;  ///< keyframes in a row
+  bool one_eyed_ = false;
 };
 
 }  // namespace roadfix

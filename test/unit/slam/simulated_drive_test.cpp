@@ -13,17 +13,18 @@ namespace roadfix {
 namespace {
 
 constexpr int kFrames = 110;
+constexpr int kStraight = 80;  // first frame after the bend
 constexpr double kStep = 1.0;  // m a frame, 10 m/s
 constexpr double kBaseline = 0.5;
 
 const CameraIntrinsics kLens{800, 400, 460.0, 460.0, 400.0, 200.0, Distortion::kNone, {}};
 
-/// Straight, a bend that the seed chooses, straight.
-SE3 true_pose(int frame, uint64_t seed) {
-  const double bend = 0.02 * (static_cast<double>(seed % 7) - 3.0) / 3.0;  // rad a frame
+/// Straight, a bend that the seed chooses, up to `sharpness` times 57 degrees, straight.
+SE3 true_pose(int frame, uint64_t seed, double sharpness) {
+  const double bend = sharpness * 0.02 * (static_cast<double>(seed % 7) - 3.0) / 3.0;  // rad a frame
   SE3 T;
   for (int i = 0; i < frame; ++i) {
-    const double turn = i > 30 && i < 80 ? bend : 0.0;
+    const double turn = i > 30 && i < kStraight ? bend : 0.0;
     const Eigen::Quaterniond half(Eigen::AngleAxisd(0.5 * turn, Eigen::Vector3d::UnitZ()));
     T.p += kStep * (T.q * half * Eigen::Vector3d::UnitX());
     T.q = T.q * half * half;
@@ -37,6 +38,7 @@ const SE3 kVehicleLeft{Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.0, 0.0, 1.6}
 struct Drive {
   double nees = 0.0;                ///< of the last pose against the first, per degree of freedom
   double error = 0.0, sigma = 0.0;  ///< m, of its position
+  double last_way = 0.0;            ///< along the last straight, over the true one
   int valid = 0;
 };
 
@@ -47,13 +49,17 @@ struct Calibrated {
   double right_shift_px = 0.0;      ///< of the right picture, sideways
   double right_turn_std_deg = 0.0;  ///< the tracker's doubt
   SharedDoubt doubt = {};           ///< the same
+  double focal_std = 0.0;           ///< the same, with one eye
+  int right_until = kFrames;        ///< frames that the right eye sees
+  bool wheels = false;              ///< beside stereo
+  double sharpness = 1.0;           ///< of the bend
 };
 
 Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calibrated) {
   fix_eigen_blocking();
   StreetPlan plan;
   for (int i = -10; i < kFrames + 60; ++i) {
-    const SE3 T = true_pose(std::clamp(i, 0, kFrames), seed);
+    const SE3 T = true_pose(std::clamp(i, 0, kFrames), seed, calibrated.sharpness);
     plan.driven.emplace_back(T.p + (i - std::clamp(i, 0, kFrames)) * (T.q * Eigen::Vector3d::UnitX()));
   }
   plan.segments = {{0.0, StreetKind::kStreet}};
@@ -80,7 +86,8 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
   TrackSimulator simulator(world, tracks, Camera(kLens), right, seed);
 
   KeyframeTrackerConfig config;
-  config.focal_std = config.radial_std = 0.0;  // this lens is known exactly
+  config.focal_std = calibrated.focal_std;
+  config.radial_std = 0.0;  // that is known exactly
   config.right_turn_std_deg = calibrated.right_turn_std_deg;
   const auto seen = std::make_shared<test::SeenTracks>();
   InlineExecutor executor;
@@ -94,16 +101,19 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
   std::mt19937 random(static_cast<unsigned>(seed));
   std::normal_distribution<double> speed_noise(0.0, kSpeedSigma);
   std::optional<SE3> T_local_enu;
+  SE3 T_local_straight;
   for (int i = 0; i < kFrames; ++i) {
-    const SE3 T_enu_vehicle = true_pose(i, seed);
+    const SE3 T_enu_vehicle = true_pose(i, seed, calibrated.sharpness);
     View view;
     view.t_s = 0.1 * i;
     view.T_enu_camera = T_enu_vehicle * kVehicleLeft;
     seen->now.clear();
     for (const TrackObservation& o : simulator.observe(view)) seen->now.emplace(o.id, o);
     const int64_t t_us = 100'000 * (i + 1);
-    if (!stereo) tracker.speed({t_us, SpeedSource::kWheels, kStep / 0.1 + speed_noise(random), kSpeedSigma, 0.0});
-    const TrackedFrame& out = tracker.process({t_us, picture, stereo ? picture : cv::Mat()});
+    if (!stereo || calibrated.wheels)
+      tracker.speed({t_us, SpeedSource::kWheels, kStep / 0.1 + speed_noise(random), kSpeedSigma, 0.0});
+    const TrackedFrame& out =
+        tracker.process({t_us, picture, stereo && i < calibrated.right_until ? picture : cv::Mat()});
     const Odometry& o = out.odometry;
     if (o.validity != Validity::kValid) continue;
     ++result.valid;
@@ -111,6 +121,8 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
     const Vector6d e = local(o.T_frame_vehicle, *T_local_enu * T_enu_vehicle);
     result.nees = e.dot(o.cov_pose.ldlt().solve(e)) / 6.0;
     result.error = e.head<3>().norm();
+    if (i <= kStraight) T_local_straight = o.T_frame_vehicle;
+    result.last_way = (o.T_frame_vehicle.p - T_local_straight.p).norm() / (kStep * std::max(1, i - kStraight));
     result.sigma = std::sqrt(o.cov_pose.topLeftCorner<3, 3>().trace());
   }
   return result;
@@ -198,6 +210,30 @@ TEST_CASE("a right picture that lies a third of a pixel off is found out by the 
     CHECK(learnt.error < 0.25 * believed.error);  // teeth: the same drive, the calibration believed
     CHECK(believed.error > 1.0);
   }
+}
+
+TEST_CASE("stereo that loses an eye before a bend keeps its lengths in it") {
+  const Calibrated told{
+      .focal_error = 0.02, .doubt = CameraRig{}.doubt, .focal_std = 0.01, .right_until = 30, .sharpness = 2.0};
+  Calibrated believed = told, wheels = told, both = told;
+  believed.focal_std = 0.0;
+  wheels.wheels = true;
+  both.right_until = kFrames;
+  const auto stretch = [](const Calibrated& calibrated) {
+    double sum = 0.0;
+    for (const uint64_t seed : {1U, 7U, 8U}) {  // the sharpest bends
+      sum += std::abs(drive(seed, true, 0.3, calibrated).last_way - 1.0) / 3.0;
+    }
+    return sum;
+  };
+  const double with_both = stretch(both), learnt = stretch(told), by_wheels = stretch(wheels);
+  const double as_told = stretch(believed);
+  std::printf(
+      "right eye lost, focal length 2 %% off: lengths %.4f off after the bend, %.4f with wheels; %.4f with the lens "
+      "believed, %.4f with both eyes\n",
+      learnt, by_wheels, as_told, with_both);
+  CHECK(learnt < 0.5 * as_told);
+  CHECK(by_wheels < 0.2 * as_told);
 }
 
 }  // namespace
