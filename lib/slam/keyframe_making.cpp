@@ -15,9 +15,10 @@
 namespace roadfix {
 namespace {
 
-constexpr double kStandingShare = 0.4;   ///< of a keyframe's landmarks, below which one is made at a standstill too
-constexpr double kFoundMemory = 0.8;     ///< how much of the share found after keyframes stays from one to the next
-constexpr double kNoiseFlow = 1.67;      ///< sigmas: Rayleigh's median times root 2, a flow that is noise alone
+constexpr double kStandingShare = 0.4;  ///< of a keyframe's landmarks, below which one is made at a standstill too
+constexpr double kRipeShare = 0.5;    ///< tracks that could become points, over landmarks seen, that ask for a keyframe
+constexpr double kFoundMemory = 0.8;  ///< how much of the share found after keyframes stays from one to the next
+constexpr double kNoiseFlow = 1.67;   ///< sigmas: Rayleigh's median times root 2, a flow that is noise alone
 constexpr double kStandingDepth = 10.0;  ///< m, of what is seen: how far a car may have crept by so little flow
 
 }  // namespace
@@ -46,6 +47,19 @@ void KeyframeTracker::learn_found_share() {
   found_share_ = kFoundMemory * found_share_ + (1.0 - kFoundMemory) * found;
 }
 
+/// Tracks without a point that the last keyframe saw and that have moved by a keyframe's way since.
+int KeyframeTracker::num_ripe(const std::vector<Feature>& features) const {
+  const Eigen::Quaterniond q_now_keyframe = T_map_camera_.q.conjugate() * map_.last().T_map_camera.q;
+  std::vector<Feature> waiting;
+  for (const Feature& f : features) {
+    const Landmark* landmark = map_.find(f.track);
+    if (landmark != nullptr && !landmark->p_map) waiting.push_back(f);
+  }
+  const std::vector<double> flows = flows_beyond(q_now_keyframe, waiting);
+  return static_cast<int>(
+      std::count_if(flows.begin(), flows.end(), [&](double flow) { return flow > config_.keyframe_flow_px; }));
+}
+
 bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const {
   std::vector<double> flows = flows_beyond(T_map_camera_.q.conjugate() * map_.last().T_map_camera.q, features);
   if (flows.empty()) return true;
@@ -56,6 +70,7 @@ bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const
   const bool standing = *middle < config_.standing_flow_px;
   const double share = standing ? kStandingShare : config_.keyframe_min_share;
   if (out_.num_inliers < share * found_share_ * landmarks_at_keyframe_) return true;
+  if (static_cast<double>(num_ripe(features)) > kRipeShare * out_.num_inliers) return true;
   return !standing && mean > config_.keyframe_flow_px;
 }
 

@@ -6,6 +6,11 @@
 #include "slam/two_view.h"
 
 namespace roadfix {
+namespace {
+
+constexpr double kNearFlow = 2.0;  ///< start flows by which tracks have moved that alone are enough to begin
+
+}  // namespace
 
 void KeyframeTracker::start(const CameraFrame& frame) {
   if (stereo_ && !frame.right.empty()) {
@@ -133,7 +138,11 @@ void KeyframeTracker::start_mono(const CameraFrame& frame) {
   // What is near leaves the picture first and what stays moves little: rather a short way than none. Whether it is
   // long enough, the parallax of the points says.
   const bool last_chance = 2 * pairs.tracks.size() < start_->seen.size();
-  if (last_chance || flow[flow.size() / 2] >= config_.start_flow_px) finish_start(frame, pairs);
+  // On a highway most of the picture is so far away that it stays and does not move: what is near counts there.
+  const double near_px = kNearFlow * config_.start_flow_px;
+  const auto near = std::count_if(flow.begin(), flow.end(), [near_px](double px) { return px >= near_px; });
+  const bool enough = flow[flow.size() / 2] >= config_.start_flow_px || near >= config_.start_points;
+  if (last_chance || enough) finish_start(frame, pairs);
   if (last_chance && map_.empty()) {
     begin_start(frame, features);
     wait_for_parallax(frame.t_us, start_->seen.size());

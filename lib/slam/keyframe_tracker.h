@@ -224,6 +224,7 @@ class KeyframeTracker {
                                                  const std::vector<Feature>& features) const;
   [[nodiscard]] bool hold(const CameraFrame& frame, const std::vector<Feature>& features);
   [[nodiscard]] bool pull_away(const CameraFrame& frame, const std::vector<Feature>& features);
+  [[nodiscard]] int num_ripe(const std::vector<Feature>& features) const;
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
   void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features);
   void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);

@@ -14,8 +14,8 @@ std::vector<cv::Point2d> to_cv(std::span<const Eigen::Vector2d> points) {
   return out;
 }
 
-/// Share of the pairs that turning alone explains (Kabsch, 1976): with a large one the motion is not to be had.
-double share_of_turning(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second, double gate) {
+/// How many of the pairs turning alone (Kabsch, 1976) does not explain: with few of them the motion is not to be had.
+int num_beyond_turning(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second, double gate) {
   Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
   for (size_t i = 0; i < first.size(); ++i) {
     correlation += first[i].homogeneous().normalized() * second[i].homogeneous().normalized().transpose();
@@ -24,12 +24,12 @@ double share_of_turning(std::span<const Eigen::Vector2d> first, std::span<const 
   Eigen::Matrix3d proper = Eigen::Matrix3d::Identity();
   proper(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
   const Eigen::Matrix3d R_first_second = svd.matrixU() * proper * svd.matrixV().transpose();
-  int turned = 0;
+  int beyond = 0;
   for (size_t i = 0; i < first.size(); ++i) {
     const Eigen::Vector3d expected = R_first_second.transpose() * first[i].homogeneous();
-    turned += (expected.hnormalized() - second[i]).norm() < gate ? 1 : 0;
+    beyond += (expected.hnormalized() - second[i]).norm() < gate ? 0 : 1;
   }
-  return static_cast<double>(turned) / static_cast<double>(first.size());
+  return beyond;
 }
 
 }  // namespace
@@ -37,15 +37,16 @@ double share_of_turning(std::span<const Eigen::Vector2d> first, std::span<const 
 std::optional<TwoView> two_view_motion(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second,
                                        const TwoViewConfig& config) {
   if (first.size() != second.size() || static_cast<int>(first.size()) < config.min_points) return std::nullopt;
-  if (share_of_turning(first, second, config.gate_px / config.focal_px) > config.max_turning_share) return std::nullopt;
+  const int fewest = config.min_points / 2;
+  if (num_beyond_turning(first, second, config.gate_px / config.focal_px) < fewest) return std::nullopt;
   const std::vector<cv::Point2d> a = to_cv(first), b = to_cv(second);
   constexpr double kConfidence = 0.9999;
   cv::Mat mask;
   const cv::Mat E = cv::findEssentialMat(a, b, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence,
                                          config.gate_px / config.focal_px, mask);
   if (E.rows != 3 || E.cols != 3) return std::nullopt;
-  cv::Mat R, t;
-  cv::recoverPose(E, a, b, cv::Mat::eye(3, 3, CV_64F), R, t, mask);
+  cv::Mat R, t, near = mask.clone();  // recoverPose() keeps those nearer than 50 times the way between the pictures
+  cv::recoverPose(E, a, b, cv::Mat::eye(3, 3, CV_64F), R, t, near);
   Eigen::Matrix3d R_second_first;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) R_second_first(r, c) = R.at<double>(r, c);
@@ -57,11 +58,16 @@ std::optional<TwoView> two_view_motion(std::span<const Eigen::Vector2d> first, s
   for (size_t i = 0; i < first.size(); ++i) {
     result.inlier[i] = mask.at<uint8_t>(static_cast<int>(i)) != 0;
     if (!result.inlier[i]) continue;
-    ++inliers;
     const std::array<Ray, 2> rays{ray(SE3{}, first[i]), ray(result.T_first_second, second[i])};
-    points += triangulate(rays, config.min_angle_deg * kDegree) ? 1 : 0;
+    const bool point = triangulate(rays, config.min_angle_deg * kDegree).has_value();
+    const bool far = rays[0].direction.cross(rays[1].direction).norm() < config.min_angle_deg * kDegree;
+    result.inlier[i] = point || far;  // who lies behind is on the line by chance
+    inliers += result.inlier[i] ? 1 : 0;
+    points += point ? 1 : 0;
   }
-  if (points < config.min_points || inliers < config.min_inlier_share * static_cast<double>(first.size())) return {};
+  const double share = static_cast<double>(inliers) / static_cast<double>(first.size());
+  const int wanted = share > config.sure_inlier_share ? fewest : config.min_points;
+  if (points < wanted || share < config.min_inlier_share) return {};
   return result;
 }
 

@@ -15,7 +15,7 @@ struct TwoViewConfig {
   double min_angle_deg = 0.6;  ///< of the rays of a point that counts
   int min_points = 60;         ///< that must have it
   double min_inlier_share = 0.6;
-  double max_turning_share = 0.5;  ///< of pairs that a rotation alone explains
+  double sure_inlier_share = 0.8;  ///< from which half as many points will do: on a highway most is far away
 };
 
 struct TwoView {

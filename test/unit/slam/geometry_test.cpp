@@ -174,5 +174,30 @@ TEST_CASE("two views give the motion, and refuse turning on the spot") {
   CHECK_FALSE(two_view_motion(first, turned, config));
 }
 
+TEST_CASE("two views of a highway give the motion from the few points that are near") {
+  Rng random(12);
+  std::normal_distribution<double> normal;
+  const SE3 T_first_second{exp_q({0.0, 0.01, 0.0}), Eigen::Vector3d::UnitZ()};
+  const auto seen = [&](int near) {
+    std::vector<Eigen::Vector2d> first, second;
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector3d p = (i < near ? 0.4 : 300.0) * some_point(random);
+      first.push_back(p.hnormalized());
+      second.push_back((T_first_second.inverse() * p).hnormalized() +
+                       (0.2 / 700.0) * Eigen::Vector2d(normal(random), normal(random)));
+    }
+    return std::pair(first, second);
+  };
+  TwoViewConfig config;
+  config.focal_px = 700.0;
+  const auto [first, second] = seen(50);
+  const auto motion = two_view_motion(first, second, config);
+  REQUIRE(motion);
+  CHECK(local(motion->T_first_second, T_first_second).norm() < 0.03);
+  CHECK(std::count(motion->inlier.begin(), motion->inlier.end(), true) > 180);  // those far away, too: they turn
+  const auto [far_first, far_second] = seen(20);
+  CHECK_FALSE(two_view_motion(far_first, far_second, config));  // teeth
+}
+
 }  // namespace
 }  // namespace roadfix

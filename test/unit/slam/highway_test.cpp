@@ -1,0 +1,87 @@
+/// A motorway as one camera sees it: most tracks lie at the horizon or in the sky and never become points, and what is
+/// near leaves the picture after a few frames.
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "fed_tracker.h"
+
+namespace roadfix {
+namespace {
+
+constexpr double kStep = 3.3;  // m a frame, 33 m/s at 10 Hz
+constexpr int kFrames = 150;
+
+/// Every near point is seen for some 21 m of the way: six frames.
+class Motorway {
+ public:
+  Motorway(const Camera& camera, int num_far) : camera_(camera) {
+    const auto within = [this](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random_);
+    };
+    for (int i = 0; i < num_far; ++i) points_.emplace_back(within(-0.8, 0.8) * 1e5, within(-0.25, 0.0) * 1e5, 1e5);
+    for (double z = 0.0; z < kFrames * kStep; z += 0.1) {
+      const double side = within(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+      points_.emplace_back(side * within(2.0, 9.0), within(-1.0, 1.5), z);
+    }
+  }
+
+  std::vector<TrackObservation> observe(double z_camera) {
+    std::vector<TrackObservation> out;
+    for (size_t i = 0; i < points_.size(); ++i) {
+      const Eigen::Vector3d p = points_[i] - Eigen::Vector3d(0.0, 0.0, z_camera);
+      const bool near = p.z() > 9.0 && p.z()<25.0, far = p.z()> 1e4;
+      const auto pixel = near || far ? camera_.project(p) : std::nullopt;
+      if (!pixel || !camera_.sees(*pixel)) continue;
+      std::normal_distribution<double> noise(0.0, 0.3);
+      TrackObservation o;
+      o.p_enu = p;
+      o.id = static_cast<int64_t>(i) + 1;
+      o.left = *pixel + Eigen::Vector2d(noise(random_), noise(random_));
+      out.push_back(o);
+    }
+    return out;
+  }
+
+ private:
+  Camera camera_;
+  std::mt19937 random_{5};
+  std::vector<Eigen::Vector3d> points_;
+};
+
+struct Seen {
+  int valid = 0;
+  double length_ratio = 0.0;  ///< of the way's last third over its first
+};
+
+Seen drive(int num_far) {
+  ScenarioConfig scenario = test::shortened("highway", 20.0);
+  KeyframeTrackerConfig config = test::exact_lens();
+  test::FedTracker tracker(config, scenario, false);
+  Motorway motorway(Camera(intrinsics_of(scenario.camera)), num_far);
+  Seen seen;
+  std::vector<Eigen::Vector3d> way;
+  for (int i = 0; i < kFrames; ++i) {
+    const TrackedFrame& out = tracker.process(100'000 * (i + 1), motorway.observe(kStep * i));
+    if (out.odometry.validity != Validity::kValid) continue;
+    ++seen.valid;
+    way.push_back(out.odometry.T_frame_vehicle.p);
+  }
+  if (way.size() > 30) {
+    const size_t third = way.size() / 3;
+    seen.length_ratio = (way.back() - way[way.size() - third]).norm() / (way[third - 1] - way.front()).norm();
+  }
+  std::printf("motorway, %d far tracks: %d of %d poses, lengths at the end %.3f of those at the beginning\n", num_far,
+              seen.valid, kFrames, seen.length_ratio);
+  return seen;
+}
+
+TEST_CASE("mono keeps its pose and its scale where most of what it sees is far away") {
+  for (const int num_far : {0, 60, 200}) {
+    const Seen seen = drive(num_far);
+    CHECK(seen.valid > kFrames - 15);
+    CHECK(std::abs(seen.length_ratio - 1.0) < 0.2);
+  }
+}
+
+}  // namespace
+}  // namespace roadfix
