@@ -16,6 +16,7 @@ namespace {
 constexpr double kUnknownPosition = 1e-3;  ///< m: a local frame begins where it begins
 constexpr double kUnknownSpeed = 50.0;     ///< m/s
 constexpr double kShortestDoubt = 0.1;     ///< s
+constexpr double kLongestMap = 1e6;        ///< s
 constexpr double kLongestStep = 0.1;       ///< s, of the motion models; longer silences go in several
 
 /// Of all elements at once: what is finite is nothing times zero.
@@ -28,6 +29,11 @@ bool usable(const Odometry& o) {
   return finite(o.T_frame_vehicle.p) && std::abs(o.T_frame_vehicle.q.norm() - 1.0) < 1e-3 && finite(o.velocity) &&
          finite(o.angular_rate) && finite(o.cov_pose) && finite(o.cov_velocity) &&
          o.cov_pose.diagonal().minCoeff() >= 0.0;
+}
+
+bool usable(const PlanarPassing& e) {
+  return finite(e.picture) && finite(e.map) && e.picture.diagonal().minCoeff() >= 0.0 &&
+         e.map.diagonal().minCoeff() >= 0.0 && e.map_time >= 0.0 && e.map_time < kLongestMap;
 }
 
 }  // namespace
@@ -56,10 +62,11 @@ const MotionFloor& Fusion::floor(FusionChannel c) const {
   return c == FusionChannel::kVo ? config_.vo_floor : config_.wheel_floor;
 }
 
-Eigen::Matrix3d Fusion::jitter(FusionChannel c) const {
-  if (c != FusionChannel::kVo) return Eigen::Matrix3d::Zero();
+/// What the sample says of it, or where it does not, the configuration.
+PlanarPassing Fusion::passing(const ChannelSample& s) const {
+  if (s.passing || s.channel != FusionChannel::kVo) return s.passing.value_or(PlanarPassing{});
   const Eigen::Vector3d sigma(config_.vo_jitter, config_.vo_jitter, config_.vo_yaw_jitter);
-  return sigma.cwiseAbs2().asDiagonal();
+  return {sigma.cwiseAbs2().asDiagonal(), Eigen::Matrix3d::Zero(), 0.0};
 }
 
 bool Fusion::alive_at(FusionChannel c, int64_t t_us) const {
@@ -83,7 +90,7 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   report.dof = 0;
   report.gate = config_.gate;
   const auto done = [&](FuseStatus status) { return report.status = status; };
-  if (!usable(s.odometry)) return done(FuseStatus::kBadInput);
+  if (!usable(s.odometry) || (s.passing && !usable(*s.passing))) return done(FuseStatus::kBadInput);
   if (started_ && s.odometry.t_us < t_us_) return done(FuseStatus::kNotReady);
   const bool good = s.odometry.validity != Validity::kInvalid;
   if (s.channel == FusionChannel::kWheel && good && alive_at(FusionChannel::kIns, s.odometry.t_us)) {

@@ -26,6 +26,7 @@ inline constexpr int kFusionChannels = 3;
 struct ChannelSample {
   FusionChannel channel = FusionChannel::kIns;
   Odometry odometry;  ///< covariances without what the channel's whole way has in common: without_common()
+  std::optional<PlanarPassing> passing;  ///< of a vision that tells it; picture's part not in the odometry's covariance
   int reset_counter = 0;
   bool metric = true;  ///< false: lengths are up to a common factor
   /// A filter over the gyro that the INS uses (an MSCKF): its yaw is no second witness, and its poses take back what
@@ -182,9 +183,9 @@ class Fusion {
                                              const Planar& motion, double dt) const;
   FuseStatus carry_by_ins(const Planar& motion, double dt, const Eigen::Matrix3d& R, bool with_yaw,
                           FusionChannelReport& report);
-  FuseStatus fuse_odometry(FusionChannel channel, const Planar& motion, double dt, const Eigen::Matrix3d& R,
+  FuseStatus fuse_odometry(const ChannelSample& sample, const Planar& motion, double dt, const Eigen::Matrix3d& R,
                            bool with_yaw, FusionChannelReport& report);
-  [[nodiscard]] Eigen::Matrix3d jitter(FusionChannel c) const;
+  [[nodiscard]] PlanarPassing passing(const ChannelSample& sample) const;
   void fuse_rates(const ChannelSample& sample, const LevelView& view, bool told);
   FuseStatus fuse_gain(const ChannelSample& sample, const LevelView& view, const PlanarEstimate& known,
                        FusionChannelReport& report);

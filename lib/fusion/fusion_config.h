@@ -39,8 +39,9 @@ struct FusionConfig {
   MotionFloor ins_floor{0.002, 0.0, 0.0, 2e-5};
   MotionFloor vo_floor{0.005, 0.005, 0.002, 1e-4};  ///< stereo sees the way less sharply than its direction
   MotionFloor wheel_floor{0.01, 0.003, 0.003, 5e-4};
-  double vo_jitter = 0.005;     ///< m, error of one picture's place that the next ones do not have
-  double vo_yaw_jitter = 1e-3;  ///< rad, likewise: small pictures of one eye
+  double vo_jitter = 0.005;     ///< m, error of one picture's place that the next ones do not have, of a vision that
+                                ///< does not tell it
+  double vo_yaw_jitter = 1e-3;  ///< rad, likewise
   double vo_scale_std = 0.03;   ///< before GNSS has shown it
   double vo_turns_std = 0.003;  ///< share of its turns: the focal length (slam's M.22), a gyro's scale
   double wheel_scale_std = 0.01;

@@ -137,8 +137,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
     R(2, 2) = kUninformative;
   }
   const bool with_yaw = R(2, 2) < kUninformative;
-  return ins ? carry_by_ins(motion, dt, R, with_yaw, report)
-             : fuse_odometry(s.channel, motion, dt, R, with_yaw, report);
+  return ins ? carry_by_ins(motion, dt, R, with_yaw, report) : fuse_odometry(s, motion, dt, R, with_yaw, report);
 }
 
 /// The place and the yaw are the INS's, carried on (F.11b).
@@ -158,15 +157,15 @@ FuseStatus Fusion::carry_by_ins(const Planar& motion, double dt, const Eigen::Ma
 
 /// An odometry's pose goes on beside the fused one, by its own motion (F.11c), and is compared with it: what its
 /// pictures err by, each anew, does not add up (F.11d).
-FuseStatus Fusion::fuse_odometry(FusionChannel channel, const Planar& motion, double dt, const Eigen::Matrix3d& R,
+FuseStatus Fusion::fuse_odometry(const ChannelSample& s, const Planar& motion, double dt, const Eigen::Matrix3d& R,
                                  bool with_yaw, FusionChannelReport& report) {
+  const FusionChannel channel = s.channel;
   Memory& m = memory(channel);
   const ChannelSlots where = slots(channel);
-  const Eigen::Matrix3d white = jitter(channel);
+  const PlanarPassing off = passing(s);
+  const Eigen::Matrix3d white = off.picture + off.map;
   const FusionEstimate now = combine(imm_);
-  Eigen::Matrix3d measured = R + white;
-  if (where.scale)
-    measured.topLeftCorner<2, 2>() += std::expm1(2.0 * now.x(*where.scale)) * white.topLeftCorner<2, 2>();
+  const Eigen::Matrix3d measured = R + white;
   if (channel == FusionChannel::kVo) {
     const FusionMeasurement<3> at = relative_motion(now.x, where, motion, dt, measured);
     tell(judge<3>(now, at.H, at.innovation, at.R), at.innovation, report);
@@ -188,7 +187,8 @@ FuseStatus Fusion::fuse_odometry(FusionChannel channel, const Planar& motion, do
   }
   for (Mode& mode : imm_.modes) carry_clone(mode.estimate, where, motion, dt, R);
   m.carried = true;
-  const Mean<3> used = update<3>([&](const Vector& x) { return same_pose(x, where, white); });
+  const Eigen::Matrix3d lasting = in_frame(as_white(off, dt), now.x, where);
+  const Mean<3> used = update<3>([&](const Vector& x) { return same_pose(x, where, lasting); });
   tell(used.innovation, used.difference, report);
   return FuseStatus::kAccepted;
 }

@@ -203,9 +203,11 @@ void Fusion::remember(const ChannelSample& s, const LevelView& view) {
     return;
   }
   const int clone = slots(s.channel).clone;
+  const PlanarPassing off = passing(s);
+  const Eigen::Matrix3d here = in_frame(off.picture + off.map, combine(imm_).x, slots(s.channel));
   for (Mode& mode : imm_.modes) {
     clone_pose(mode.estimate, clone);
-    mode.estimate.P.block<3, 3>(clone, clone) += jitter(s.channel);
+    mode.estimate.P.block<3, 3>(clone, clone) += here;
   }
 }
 

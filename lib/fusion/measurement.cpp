@@ -184,6 +184,14 @@ void carry_clone(FusionEstimate& e, const ChannelSlots& slots, const Planar& mot
   e.P.block<3, 3>(c, c) = 0.5 * (P + P.transpose());
 }
 
+Eigen::Matrix3d in_frame(const Eigen::Matrix3d& R, const Vector& x, const ChannelSlots& slots) {
+  const double length = factor(x, slots.scale);
+  Eigen::Matrix3d in = turned(R, std::cos(x(kYaw)), std::sin(x(kYaw)));
+  in.topRows<2>() /= length;
+  in.leftCols<2>() /= length;
+  return in;
+}
+
 FusionMeasurement<3> same_pose(const Vector& x, const ChannelSlots& slots, const Eigen::Matrix3d& R) {
   FusionMeasurement<3> m = absolute_pose(x, x.segment<3>(slots.clone), R);
   m.H.middleCols<3>(slots.clone) = -Eigen::Matrix3d::Identity();

@@ -66,6 +66,9 @@ CarriedOn carry_on(FusionEstimate& e, const PoseBefore& start, const Planar& mot
 void carry_clone(FusionEstimate& e, const ChannelSlots& slots, const Planar& motion, double dt,
                  const Eigen::Matrix3d& R);
 
+/// Covariance R of what a channel has wrong, in its own lengths and the vehicle's axes, in those of the state.
+Eigen::Matrix3d in_frame(const Eigen::Matrix3d& R, const fusion::Vector& x, const ChannelSlots& slots);
+
 /// That pose as a measurement of the fused one (F.11d).
 FusionMeasurement<3> same_pose(const fusion::Vector& x, const ChannelSlots& slots, const Eigen::Matrix3d& R);
 

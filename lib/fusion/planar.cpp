@@ -89,6 +89,27 @@ Odometry without_common(Odometry o, const CommonError& common) {
   return o;
 }
 
+Odometry without_picture(Odometry o, const PassingError& passing) {
+  const Matrix6d root = passing.picture.llt().matrixL();
+  take_out<6, 6>(root, o.cov_pose);
+  return o;
+}
+
+PlanarPassing planar_passing(const Odometry& o, const PassingError& passing) {
+  const double yaw = yaw_of(o.T_frame_vehicle.q), c = std::cos(yaw), s = std::sin(yaw);
+  const auto level = [&](const Matrix6d& P) {
+    Odometry own = o;
+    own.cov_pose = P;
+    return turned(planar_covariance(own), c, -s);
+  };
+  return {level(passing.picture), level(passing.map), passing.map_time};
+}
+
+Eigen::Matrix3d as_white(const PlanarPassing& passing, double dt) {
+  const double alike = passing.map_time > 0.0 ? 1.0 / std::tanh(dt / passing.map_time) : 1.0;
+  return passing.picture + alike * passing.map;
+}
+
 Planar difference_of(const Planar& a, const Planar& b) {
   const Planar d = a - b;
   return {d.x(), d.y(), wrap_angle(d.z())};

@@ -78,6 +78,25 @@ struct CommonError {
 /// At most as much of it is taken out as there is.
 Odometry without_common(Odometry o, const CommonError& common);
 
+/// What a vision's pose has wrong that does not add up along its way: order and axes of a pose covariance.
+struct PassingError {
+  Matrix6d picture = Matrix6d::Zero();  ///< this picture's alone; contained in the pose's covariance
+  Matrix6d map = Matrix6d::Zero();      ///< of the local map that it is seen against,
+  double map_time = 0.0;                ///< s, which that map spans: then it is another one
+};
+/// Likewise, without the picture's part: a motion's covariance is what the rest grows by.
+Odometry without_picture(Odometry o, const PassingError& passing);
+
+/// The same from above, in the vehicle's level axes.
+struct PlanarPassing {
+  Eigen::Matrix3d picture = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d map = Eigen::Matrix3d::Zero();
+  double map_time = 0.0;
+};
+PlanarPassing planar_passing(const Odometry& o, const PassingError& passing);
+/// An error that is new in each picture and tells as little in the long run, with pictures dt apart (F.11e).
+Eigen::Matrix3d as_white(const PlanarPassing& passing, double dt);
+
 /// Least variance that a height gains on a way, m2.
 double height_growth(double way, double dt);
 

@@ -41,6 +41,7 @@ void KeyframeTracker::turn_map(const Eigen::Quaterniond& q, double sigma) {
   const SE3& T_known = map_.empty() ? T_map_camera_ : map_.last().T_map_camera;
   cov_keyframe_ = turn.covariance(cov_keyframe_, T_known);
   cov_own_ = in_map(cov_own_, {q, {}, 1.0});
+  cov_window_ = in_map(cov_window_, {q, {}, 1.0});
   cov_closed_ = turn.covariance(cov_closed_, loops_.S_map_odom().rigid() * T_known);
   shared_.move(turn.transform());
   shared_closed_.move(turn.transform());

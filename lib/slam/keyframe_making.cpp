@@ -213,6 +213,7 @@ void KeyframeTracker::finish_bundle() {
   const Matrix6d grown = job_->report.clustered_cov_last / static_cast<double>(std::max<ptrdiff_t>(1, steps));
   cov_keyframe_ += grown;
   cov_own_ += grown;
+  cov_window_ = job_->report.clustered_cov_last;
   cov_closed_ += in_map(grown, loops_.S_map_odom());
   job_.reset();
 }

@@ -32,6 +32,7 @@ void KeyframeTracker::start_after(const std::string& loss, const CameraFrame& fr
 void KeyframeTracker::start_stereo(const CameraFrame& frame) {
   std::vector<Feature> features = front_end_->track(frame.left, {});
   cov_own_.setZero();
+  cov_window_.setZero();
   make_keyframe(frame, features);
   if (landmarks_at_keyframe_ < config_.start_points) {
     out_.reason = "too few points in both pictures";
@@ -196,6 +197,7 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   map_.add_keyframe({0, frame.t_us, T_map_second, baseline}, second);
   landmarks_at_keyframe_ = count_landmarks(second);
   cov_own_.setZero();
+  cov_window_.setZero();
   begin_bundle();
   finish_bundle();
   const FrameMotion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_,

@@ -107,6 +107,7 @@ void KeyframeTracker::move_to(const SE3& T_new_old) {
     map_.move(T_new_old);
     loops_.move(first_place_, T_new_old);
     cov_own_ = in_map(cov_own_, {T_new_old.q, {}, 1.0});
+    cov_window_ = in_map(cov_window_, {T_new_old.q, {}, 1.0});
   }
   const SE3 T_new_vehicle = T_map_camera_ * T_camera_vehicle;
   ++out_.reset_counter;
@@ -223,13 +224,14 @@ void KeyframeTracker::members(Tracker& self, Archive& archive) {
   archive(odometry.t_us, odometry.T_frame_vehicle, odometry.velocity, odometry.angular_rate, odometry.cov_pose,
           odometry.cov_velocity, odometry.validity);
   archive(out.state, out.reason, out.reset_counter, out.reset_delta, out.cov_closed, out.closed_reset_counter,
-          out.closed_reset_delta, out.shared_error);
+          out.closed_reset_delta, out.shared_error, out.cov_picture, out.cov_map, out.map_time);
   archive(self.T_map_camera_, self.t_us_, self.t_good_us_, self.t_able_us_, self.motion_, self.start_, self.pixels_,
           self.landmarks_at_keyframe_, self.found_share_, self.after_keyframe_);
   archive(self.cov_keyframe_, self.cov_closed_, self.continuous_, self.found_back_, self.new_speeds_, self.scale_,
           self.scale_std_, self.restarted_, self.restart_);
   archive(self.shared_, self.shared_closed_);
-  archive(self.new_levels_, self.attitudes_, self.levelled_, self.cov_own_, self.t_begun_us_, self.first_place_);
+  archive(self.new_levels_, self.attitudes_, self.levelled_, self.cov_own_, self.cov_window_, self.t_begun_us_,
+          self.first_place_);
 }
 
 void KeyframeTracker::save(StateWriter& writer) const {

@@ -247,6 +247,9 @@ void KeyframeTracker::tell_pose(const SE3& T_map_camera, const Matrix6d& cov_cam
   out_.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle;
   out_.odometry.cov_pose = carried(cov + shared_.cov(), T_map_camera, T_camera_vehicle);
   out_.shared_error = carried_by(T_map_camera, T_camera_vehicle) * shared_.columns();
+  out_.cov_picture = carried(cov_camera, T_map_camera, T_camera_vehicle);
+  out_.cov_map = carried(cov_window_, map_.last().T_map_camera, T_keyframe_now * T_camera_vehicle);
+  out_.map_time = seconds_between(map_.held_us(), out_.odometry.t_us);
   const Sim3& S_map_odom = loops_.S_map_odom();
   const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
   const SE3 T_closed_camera = (S_map_odom * Sim3{T_map_camera.q, T_map_camera.p, 1.0}).rigid();

@@ -50,10 +50,14 @@ struct TrackedFrame {
   double scale_std = 0.0;  ///< relative, common to the whole way; meaningless where the source is none
   /// Error of odometry's pose per sigma of what the whole way shares; its square is in the covariances.
   SharedColumns shared_error = SharedColumns::Zero();
-  int reset_counter = 0;                   ///< +1 per jump of the pose
-  SE3 reset_delta;                         ///< of the last jump: p is new minus old, q is q_old^-1 q_new
-  Matrix6d cov_closed = Matrix6d::Zero();  ///< of the pose with all loops closed
-  int closed_reset_counter = 0;            ///< of that pose: it jumps where a loop is closed, odometry does not
+  /// Of odometry's error what does not add up along the way (M.23), with the order and axes of its covariance.
+  Matrix6d cov_picture = Matrix6d::Zero();  ///< this picture's alone; contained in cov_pose
+  Matrix6d cov_map = Matrix6d::Zero();      ///< of the local map that it is seen against,
+  double map_time = 0.0;                    ///< s, which that map spans
+  int reset_counter = 0;                    ///< +1 per jump of the pose
+  SE3 reset_delta;                          ///< of the last jump: p is new minus old, q is q_old^-1 q_new
+  Matrix6d cov_closed = Matrix6d::Zero();   ///< of the pose with all loops closed
+  int closed_reset_counter = 0;             ///< of that pose: it jumps where a loop is closed, odometry does not
   SE3 closed_reset_delta;
   int num_loops = 0;
   std::vector<UsedFeature> features;
@@ -255,6 +259,7 @@ class KeyframeTracker {
   bool after_keyframe_ = false;  ///< the last frame was made a keyframe
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
   Matrix6d cov_own_ = Matrix6d::Zero();       ///< what of it this map has added
+  Matrix6d cov_window_ = Matrix6d::Zero();    ///< of the last keyframe against those that are held, (M.16)
   Matrix6d cov_closed_ = Matrix6d::Zero();    ///< the same of the pose with all loops closed
   SharedError shared_, shared_closed_;        ///< of the last pose told, and of it with all loops closed
   LoopCloser loops_;

@@ -92,6 +92,8 @@ class LocalMap {
   [[nodiscard]] bool empty() const { return keyframes_.empty(); }
   [[nodiscard]] const std::deque<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] const Keyframe& last() const { return keyframes_.back(); }
+  /// Of the newest keyframe that bundle adjustment holds.
+  [[nodiscard]] int64_t held_us() const { return keyframes_[num_fixed() - 1].t_us; }
   [[nodiscard]] const std::map<int64_t, Landmark>& landmarks() const { return landmarks_; }
   [[nodiscard]] const Landmark* find(int64_t track) const;
   [[nodiscard]] const LensCorrection& lens() const { return lens_; }

@@ -47,7 +47,7 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.state_layout = 3;
+    spec_.state_layout = 4;
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0}, {"POSE_INS", "pose_t", 0, 0},
                     {"VO_STATUS", "vo_status_t", 200'000, 0},  {"POSE_VO", "pose_t", 200'000, 0},
                     {"POSE_WHEEL", "pose_t", 50'000, 0},       {"HORIZON_IMM_FUSION", "horizon_t", 0, 0}};
@@ -116,6 +116,12 @@ class ImmFusionStage final : public Stage {
     writer.put(vo_shares_imu_);
     writer.put(vo_common_.columns);
     writer.put(vo_common_.scale_std);
+    writer.put(vo_passing_.has_value());
+    if (vo_passing_) {
+      writer.put(vo_passing_->picture);
+      writer.put(vo_passing_->map);
+      writer.put(vo_passing_->map_time);
+    }
     writer.put(origin_);
     writer.put(anchor_.has_value());
     if (anchor_) {
@@ -138,6 +144,12 @@ class ImmFusionStage final : public Stage {
     reader.get(loaded.vo_shares_imu_);
     reader.get(loaded.vo_common_.columns);
     reader.get(loaded.vo_common_.scale_std);
+    if (reader.get<bool>()) {
+      PassingError& passing = loaded.vo_passing_.emplace();
+      reader.get(passing.picture);
+      reader.get(passing.map);
+      reader.get(passing.map_time);
+    }
     reader.get(loaded.origin_);
     if (reader.get<bool>()) {
       Geodetic& anchor = loaded.anchor_.emplace();
@@ -162,11 +174,18 @@ class ImmFusionStage final : public Stage {
   void take(const vo_status_t& m) {
     vo_shares_imu_ = m.mode == vo_status_t::MODE_MSCKF;
     vo_common_ = common_error(m);
+    vo_passing_ = passing_error(m);
   }
 
   void fuse(FusionChannel channel, const pose_t& message) {
     ChannelSample sample = channel_sample(channel, message, message.seq);
-    if (channel == FusionChannel::kVo) sample.odometry = without_common(sample.odometry, vo_common_);
+    if (channel == FusionChannel::kVo) {
+      sample.odometry = without_common(sample.odometry, vo_common_);
+      if (vo_passing_) {
+        sample.odometry = without_picture(sample.odometry, *vo_passing_);
+        sample.passing = planar_passing(sample.odometry, *vo_passing_);
+      }
+    }
     sample.reset_counter = counts_[static_cast<std::size_t>(channel)].after(message);
     sample.shares_imu = channel == FusionChannel::kVo && vo_shares_imu_;
     if (channel == FusionChannel::kIns && sample.odometry.validity != Validity::kInvalid) {
@@ -205,6 +224,7 @@ class ImmFusionStage final : public Stage {
   int8_t origin_ = pose_t::ORIGIN_IMU;
   bool vo_shares_imu_ = false;
   CommonError vo_common_;
+  std::optional<PassingError> vo_passing_;
   std::array<JumpCount, kFusionChannels> counts_;
   PublishSlot pose_slot_, state_slot_;
   std::vector<aiding_t> aidings_;  ///< since the last publish()

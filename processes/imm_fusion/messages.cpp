@@ -115,6 +115,19 @@ CommonError common_error(const vo_status_t& m) {
   return e;
 }
 
+std::optional<PassingError> passing_error(const vo_status_t& m) {
+  if (m.mode != vo_status_t::MODE_KEYFRAME) return std::nullopt;
+  PassingError e;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      e.picture(i, j) = m.cov_picture_m2_rad2[i][j];
+      e.map(i, j) = m.cov_map_m2_rad2[i][j];
+    }
+  }
+  e.map_time = m.map_time_s;
+  return e;
+}
+
 Geodetic anchor_of(const pose_t& m) {
   return {m.anchor_lat_deg * kDegree, m.anchor_lon_deg * kDegree, m.anchor_height_m};
 }

@@ -14,6 +14,8 @@ namespace roadfix {
 /// Everything but the count of resets, which is the caller's.
 ChannelSample channel_sample(FusionChannel channel, const pose_t& message, int64_t seq);
 CommonError common_error(const vo_status_t& message);
+/// Nothing where the vision does not tell it.
+std::optional<PassingError> passing_error(const vo_status_t& message);
 Geodetic anchor_of(const pose_t& message);
 
 /// Pose, validity, state and resets; `anchor`: nothing before the first ENU pose.

@@ -88,6 +88,13 @@ vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, Fr
   m.scale_std = frame.scale_std;
   for (int i = 0; i < shared.rows(); ++i)
     for (int j = 0; j < shared.cols(); ++j) m.shared_error_m_rad[j][i] = shared(i, j);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      m.cov_picture_m2_rad2[i][j] = frame.cov_picture(i, j);
+      m.cov_map_m2_rad2[i][j] = frame.cov_map(i, j);
+    }
+  }
+  m.map_time_s = frame.map_time;
   m.num_features = static_cast<int32_t>(frame.features.size());
   m.num_matches = frame.num_matches;
   m.num_inliers = frame.num_inliers;

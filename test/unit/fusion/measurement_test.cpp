@@ -352,6 +352,60 @@ TEST_CASE("what a vision's whole way has in common is taken out of its covarianc
   CHECK(Eigen::SelfAdjointEigenSolver<Matrix6d>(kept.cov_pose).eigenvalues().minCoeff() > -1e-12);
 }
 
+TEST_CASE("what a picture has wrong alone is taken out of its covariance, and told in the vehicle's axes") {
+  PassingError passing;
+  Vector6d own;
+  own << 0.04, 0.01, 0.01, 1e-6, 1e-6, 4e-6;
+  passing.picture = own.asDiagonal();
+  passing.map = 2.0 * passing.picture;
+  passing.map_time = 1.5;
+  Odometry o;
+  o.T_frame_vehicle.q = quaternion({M_PI_2, 0.0, 0.0});
+  o.cov_pose = Matrix6d::Identity() + passing.picture;
+  CHECK((without_picture(o, passing).cov_pose - Matrix6d::Identity()).norm() < 1e-9);
+  o.cov_pose = 0.5 * passing.picture;  // a status was lost
+  CHECK(Eigen::SelfAdjointEigenSolver<Matrix6d>(without_picture(o, passing).cov_pose).eigenvalues().minCoeff() >
+        -1e-12);
+  const PlanarPassing planar = planar_passing(o, passing);  // the car looks along the frame's y
+  CHECK((planar.picture - Eigen::Vector3d(0.01, 0.04, 4e-6).asDiagonal().toDenseMatrix()).norm() < 1e-12);
+  CHECK((planar.map - 2.0 * planar.picture).norm() < 1e-12);
+  CHECK(planar.map_time == 1.5);
+}
+
+TEST_CASE("an error as a channel's vehicle has it, in the state's axes and lengths") {
+  Draws draws(9);
+  const FusionEstimate e = random_estimate(draws);
+  const Eigen::Matrix3d A = draws.vector<9>(1.0).reshaped(3, 3), R = A * A.transpose();
+  for (const ChannelSlots slots : {ChannelSlots{kVoClone, kVoScale, kVoTurns, {}, {}}, ChannelSlots{}}) {
+    // A pose of the channel that is moved by d in its vehicle's axes moves the state's by this.
+    Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+    J.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(e.x(kYaw)).toRotationMatrix();
+    if (slots.scale) J.leftCols<2>() *= std::exp(-e.x(*slots.scale));
+    CHECK(in_frame(R, e.x, slots).isApprox(J * R * J.transpose(), 1e-9));
+  }
+}
+
+TEST_CASE("errors that last from picture to picture count as often as they are the same") {
+  constexpr double kStep = 0.1, kTime = 1.2;
+  constexpr int kPictures = 400, kRuns = 400;
+  const auto source = std::make_unique<test::Draws>(5);
+  const double keeps = std::exp(-2.0 * kStep / kTime);
+  double squares = 0.0;  // of the mean of many pictures
+  for (int run = 0; run < kRuns; ++run) {
+    double e = source->normal(1.0), sum = 0.0;
+    for (int i = 0; i < kPictures; ++i) {
+      sum += e + source->normal(0.5);
+      e = keeps * e + source->normal(std::sqrt(1.0 - keeps * keeps));
+    }
+    squares += sum * sum / kPictures / kRuns;
+  }
+  const PlanarPassing told{0.25 * Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity(), kTime};
+  CHECK(squares == Approx(as_white(told, kStep)(1, 1)).epsilon(0.2));
+  CHECK(squares > 5.0 * (told.picture + told.map)(1, 1));  // teeth: as if each were new
+  CHECK(as_white(told, 100.0).isApprox(told.picture + told.map, 1e-9));
+  CHECK(as_white({told.picture, told.map, 0.0}, kStep).isApprox(told.picture + told.map, 1e-9));
+}
+
 TEST_CASE("velocities tell the motion without the jump") {
   Odometry a, b;
   b.t_us = 100'000;

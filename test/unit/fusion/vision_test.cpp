@@ -306,8 +306,9 @@ TEST_CASE("what an MSCKF takes back of its way is no motion") {
 }
 
 /// Fused yaw error (rad) at the end of 40 s of tunnel beside a vision whose yaw wanders off by 0.2 deg in four seconds
-/// and is taken back within three pictures, again and again; `picture`: rad, what one picture is held to be off by.
-double off_by_wander(double picture) {
+/// and is taken back within three pictures, again and again; `picture`: rad, what one picture is held to be off by
+/// where the vision tells nothing of it.
+double off_by_wander(double picture, const std::optional<PlanarPassing>& told = {}) {
   constexpr double kAway = 3.5e-3, kSlow = 4.0, kFast = 0.3;
   Tunnel t;
   t.with_wheels = false;
@@ -320,8 +321,11 @@ double off_by_wander(double picture) {
   FusionConfig config;
   config.vo_yaw_jitter = picture;
   Fusion fusion(config);
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events)
+    if (e.sample.channel == FusionChannel::kVo) e.sample.passing = told;
   double off = 0.0;
-  run(fusion, t.events(), [&](const Fusion& f, const StreamEvent& e) {
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
     const double s = seconds(t.drive, e.sample.odometry.t_us);
     if (s < 93.0) off = test::planar_error(t.drive, f.fused()).error.z();
   });
@@ -329,10 +333,39 @@ double off_by_wander(double picture) {
 }
 
 TEST_CASE("a vision that wanders and is taken back is not followed one way alone") {
-  const double told = off_by_wander(FusionConfig{}.vo_yaw_jitter), sharp = off_by_wander(2e-4);
-  INFO(told << " rad; with pictures held to be off by 2e-4 " << sharp);
-  CHECK(told < 3.5e-3);
-  CHECK(sharp > 7e-3);  // teeth
+  // On its way off by 3.5e-3 rad: 1e-3 about the mean.
+  PlanarPassing picture{Eigen::Vector3d(5e-3, 5e-3, 2e-4).cwiseAbs2().asDiagonal(), Eigen::Matrix3d::Zero(), 0.0};
+  PlanarPassing told = picture;
+  told.map(2, 2) = 1e-6;
+  told.map_time = 4.0;
+  const double by_map = off_by_wander(2e-4, told), by_picture = off_by_wander(1e-3, picture),
+               constant = off_by_wander(1e-3), sharp = off_by_wander(2e-4);
+  INFO(by_map << " rad; by the picture alone " << by_picture << "; held to be off by 1e-3 " << constant << ", by 2e-4 "
+              << sharp);
+  CHECK(by_map < 3.5e-3);
+  CHECK(constant < 3.5e-3);
+  CHECK(sharp > 7e-3);       // teeth
+  CHECK(by_picture > 7e-3);  // what is told is believed
+}
+
+TEST_CASE("a vision that tells nonsense of what passes is not used") {
+  Tunnel t;
+  const auto status = [&](const std::function<void(PlanarPassing&)>& spoil) {
+    Fusion fusion({});
+    std::optional<FuseStatus> last;
+    run(fusion, t.events(), [&](const Fusion& f, const StreamEvent& e) {
+      if (last || e.sample.channel != FusionChannel::kVo || seconds(t.drive, e.sample.odometry.t_us) < 20.0) return;
+      ChannelSample s = e.sample;
+      s.odometry.t_us = f.t_us();
+      spoil(s.passing.emplace());
+      last = fusion.add(s);
+    });
+    return last.value();
+  };
+  CHECK(status([](PlanarPassing& p) { p.map(0, 1) = NAN; }) == FuseStatus::kBadInput);
+  CHECK(status([](PlanarPassing& p) { p.picture(2, 2) = -1e-6; }) == FuseStatus::kBadInput);
+  CHECK(status([](PlanarPassing& p) { p.map_time = INFINITY; }) == FuseStatus::kBadInput);
+  CHECK(status([](PlanarPassing&) {}) != FuseStatus::kBadInput);
 }
 
 /// A vision drives alone for five seconds; the sigma of its log scale by what `first` says of itself.

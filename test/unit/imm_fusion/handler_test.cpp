@@ -35,7 +35,13 @@ constexpr double kAnchor_deg[] = {37.5, 127.0};
 /// Messages in the order of arrival; all but POSE_INS late by up to `late_us`.
 class Wire {
  public:
-  explicit Wire(int64_t late_us = 0, int64_t run = 1) : late_us_(late_us), run_(run) {}
+  explicit Wire(int64_t late_us = 0, int64_t run = 1) : late_us_(late_us), run_(run) {
+    for (int i = 0; i < 6; ++i) status_.cov_picture_m2_rad2[i][i] = i < 3 ? 2.5e-5 : 4e-8;
+    status_.map_time_s = 1.2;
+  }
+
+  /// What the vision says that its local map has wrong, rad.
+  void say_map_yaw(double sigma) { status_.cov_map_m2_rad2[5][5] = sigma * sigma; }
 
   template <class T>
   void put(const std::string& channel, int64_t t_us, T message) {
@@ -52,7 +58,10 @@ class Wire {
     fill_pose(o, m);
     m.scale = pose_t::SCALE_METRIC;
     m.frame = pose_t::FRAME_LOCAL;
-    if (e.sample.channel == FusionChannel::kVo) return put("POSE_VO", o.t_us, m);
+    if (e.sample.channel == FusionChannel::kVo) {
+      put("VO_STATUS", o.t_us, status_);
+      return put("POSE_VO", o.t_us, m);
+    }
     if (e.sample.channel == FusionChannel::kWheel) return put("POSE_WHEEL", o.t_us, m);
     m.frame = pose_t::FRAME_ENU;
     m.anchor_lat_deg = kAnchor_deg[0];
@@ -73,6 +82,7 @@ class Wire {
  private:
   int64_t late_us_;
   int64_t run_;
+  vo_status_t status_{};
   std::map<std::string, int64_t> seq_;
   std::vector<Arrival> messages_;
 };
@@ -249,6 +259,20 @@ TEST_CASE("a stage that begins at a snapshot publishes what the one that never s
   state_t cut = states[1];
   cut.state.resize(cut.state.size() - 1);
   CHECK_THROWS(other.resume(cut));
+}
+
+TEST_CASE("what a vision says of its pictures' errors is believed") {
+  const auto yaw_sigma = [](double said) {
+    Wire wire;
+    wire.say_map_yaw(said);
+    for (const StreamEvent& e : events()) wire.put(e);
+    const auto fused = run(wire.take()).all<pose_t>("POSE_FUSED");
+    return std::sqrt(fused[5000].cov_pose_m2_rad2[5][5]);  // 20 s after the loss
+  };
+  const double sharp = yaw_sigma(0.0), little = yaw_sigma(2e-4), unsteady = yaw_sigma(0.02);
+  INFO(sharp << " " << little << " " << unsteady << " rad");
+  CHECK(unsteady > 1.08 * sharp);
+  CHECK(little < 1.01 * sharp);  // teeth
 }
 
 TEST_CASE("a dead channel leaves the others' result") {

@@ -35,12 +35,26 @@ SE3 true_pose(int frame, uint64_t seed, double sharpness) {
 /// Looking along the vehicle's x, 1.6 m above the ground.
 const SE3 kVehicleLeft{Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.0, 0.0, 1.6}};
 
+/// One pose beside the truth, seen from above, in the vehicle's axes: forward, left, yaw.
+struct Passed {
+  Eigen::Vector3d error;
+  Eigen::Matrix3d picture, map;  ///< what it says of it that passes
+};
+
 struct Drive {
+  std::vector<Passed> passed;
   double nees = 0.0;                ///< of the last pose against the first, per degree of freedom
   double error = 0.0, sigma = 0.0;  ///< m, of its position
   double last_way = 0.0;            ///< along the last straight, over the true one
   int valid = 0;
 };
+
+Eigen::Matrix3d seen_from_above(const Matrix6d& cov, const Eigen::Matrix3d& R_local_vehicle) {
+  Eigen::Matrix<double, 3, 6> to_vehicle = Eigen::Matrix<double, 3, 6>::Zero();
+  to_vehicle.topLeftCorner<2, 3>() = R_local_vehicle.transpose().topRows<2>();
+  to_vehicle(2, 5) = 1.0;
+  return to_vehicle * cov * to_vehicle.transpose();
+}
 
 /// What the calibration that the tracker is given has wrong, and what the tracker thinks of it.
 struct Calibrated {
@@ -120,6 +134,10 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
     if (!T_local_enu) T_local_enu = o.T_frame_vehicle * T_enu_vehicle.inverse();
     const Vector6d e = local(o.T_frame_vehicle, *T_local_enu * T_enu_vehicle);
     result.nees = e.dot(o.cov_pose.ldlt().solve(e)) / 6.0;
+    const Eigen::Matrix3d R = o.T_frame_vehicle.R();
+    const Eigen::Vector3d p = R.transpose() * e.head<3>();
+    result.passed.push_back(
+        {{p.x(), p.y(), e(5)}, seen_from_above(out.cov_picture, R), seen_from_above(out.cov_map, R)});
     result.error = e.head<3>().norm();
     if (i <= kStraight) T_local_straight = o.T_frame_vehicle;
     result.last_way = (o.T_frame_vehicle.p - T_local_straight.p).norm() / (kStep * std::max(1, i - kStraight));
@@ -197,6 +215,46 @@ TEST_CASE("the covariance knows what the calibration may have wrong for the whol
   // Teeth: the same errors where one of the two is not told.
   CHECK(test("lengths untold", {doubt.lengths, 0.0}, {0.0, doubt.turns}) > 50.0);
   CHECK(test("turns untold", {0.0, doubt.turns}, {doubt.lengths, 0.0}) > 2.0);
+}
+
+/// Per degree of freedom, the error of what passes: beside the mean of two seconds around it, with its trend, over what
+/// is told of it, `told` of one picture.
+template <class Told>
+double passing_nees(bool stereo, double noise_px, const Told& told) {
+  constexpr int kDrives = 10, kAround = 10;  // pictures before and after
+  double sum = 0.0;
+  int count = 0;
+  for (int seed = 1; seed <= kDrives; ++seed) {
+    const std::vector<Passed> passed = drive(static_cast<uint64_t>(seed), stereo, noise_px, {}).passed;
+    for (size_t i = 2 * kAround; i + kAround < passed.size(); ++i) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+      for (size_t k = i - kAround; k <= i + kAround; ++k) mean += passed[k].error / (2 * kAround + 1);
+      const Eigen::Vector3d e = passed[i].error - mean;
+      sum += e.dot(told(passed[i]).ldlt().solve(e)) / 3.0;
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+TEST_CASE("what one picture and its map have wrong for a while is told", "[statistics]") {
+  const auto all = [](const Passed& p) -> Eigen::Matrix3d { return p.picture + p.map; };
+  const auto picture = [](const Passed& p) -> Eigen::Matrix3d { return p.picture; };
+  const auto constant = [](const Passed&) -> Eigen::Matrix3d {
+    return Eigen::Vector3d(0.005, 0.005, 1e-3).cwiseAbs2().asDiagonal();
+  };
+  std::vector<double> constants;
+  for (const bool stereo : {true, false}) {
+    for (const double noise_px : {0.15, 0.6}) {
+      const double nees = passing_nees(stereo, noise_px, all), without_map = passing_nees(stereo, noise_px, picture);
+      constants.push_back(passing_nees(stereo, noise_px, constant));
+      std::printf("passing, %s %.2f px: nees %.2f, of the picture alone %.2f, of constants %.2f\n",
+                  stereo ? "stereo" : "mono", noise_px, nees, without_map, constants.back());
+      CHECK(nees > 0.3);
+      CHECK(nees < 1.3);
+      CHECK(without_map > 1.5 * nees);  // teeth
+    }
+  }
 }
 
 TEST_CASE("a right picture that lies a third of a pixel off is found out by the motion") {

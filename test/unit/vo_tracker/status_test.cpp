@@ -82,6 +82,30 @@ TEST_CASE("what a calibration may have wrong for the whole way is in the covaria
   CHECK(told.position_m[0] > 5.0);
 }
 
+TEST_CASE("what a picture and its map have wrong for a while is told beside the pose") {
+  const Collector out = run(pictures(), true);
+  const auto statuses = out.all<vo_status_t>("VO_STATUS");
+  const auto poses = out.all<pose_t>("POSE_VO");
+  REQUIRE(statuses.size() == poses.size());
+  for (const size_t i : {20u, 40u, 59u}) {
+    REQUIRE(statuses[i].utime == poses[i].utime);
+    Matrix6d pose, picture, map;
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c < 6; ++c) {
+        pose(r, c) = poses[i].cov_pose_m2_rad2[r][c];
+        picture(r, c) = statuses[i].cov_picture_m2_rad2[r][c];
+        map(r, c) = statuses[i].cov_map_m2_rad2[r][c];
+      }
+    }
+    CHECK(picture.llt().info() == Eigen::Success);
+    CHECK(map.llt().info() == Eigen::Success);
+    const Matrix6d rest = pose - picture;  // the pose's contains the picture's
+    CHECK(rest.llt().info() == Eigen::Success);
+    CHECK(statuses[i].map_time_s > 0.5);
+    CHECK(statuses[i].map_time_s < 3.0);
+  }
+}
+
 TEST_CASE("INS speeds that come after the start give a running map its scale") {
   const Collector out = run(with_ins(pictures(), 16, 0.1), false);
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
