@@ -54,18 +54,17 @@ std::optional<TwoView> two_view_motion(std::span<const Eigen::Vector2d> first, s
   const SE3 T_second_first{Eigen::Quaterniond(R_second_first).normalized(),
                            {t.at<double>(0), t.at<double>(1), t.at<double>(2)}};
   TwoView result{T_second_first.inverse(), std::vector<bool>(first.size(), false)};
-  int points = 0, inliers = 0;
+  int points = 0, agreeing = 0;
   for (size_t i = 0; i < first.size(); ++i) {
-    result.inlier[i] = mask.at<uint8_t>(static_cast<int>(i)) != 0;
-    if (!result.inlier[i]) continue;
+    result.inlier[i] = near.at<uint8_t>(static_cast<int>(i)) != 0;
+    if (mask.at<uint8_t>(static_cast<int>(i)) == 0) continue;
     const std::array<Ray, 2> rays{ray(SE3{}, first[i]), ray(result.T_first_second, second[i])};
     const bool point = triangulate(rays, config.min_angle_deg * kDegree).has_value();
     const bool far = rays[0].direction.cross(rays[1].direction).norm() < config.min_angle_deg * kDegree;
-    result.inlier[i] = point || far;  // who lies behind is on the line by chance
-    inliers += result.inlier[i] ? 1 : 0;
+    agreeing += point || far ? 1 : 0;  // who lies behind is on the line by chance
     points += point ? 1 : 0;
   }
-  const double share = static_cast<double>(inliers) / static_cast<double>(first.size());
+  const double share = static_cast<double>(agreeing) / static_cast<double>(first.size());
   const int wanted = share > config.sure_inlier_share ? fewest : config.min_points;
   if (points < wanted || share < config.min_inlier_share) return {};
   return result;

@@ -194,7 +194,6 @@ TEST_CASE("two views of a highway give the motion from the few points that are n
   const auto motion = two_view_motion(first, second, config);
   REQUIRE(motion);
   CHECK(local(motion->T_first_second, T_first_second).norm() < 0.03);
-  CHECK(std::count(motion->inlier.begin(), motion->inlier.end(), true) > 180);  // those far away, too: they turn
   const auto [far_first, far_second] = seen(20);
   CHECK_FALSE(two_view_motion(far_first, far_second, config));  // teeth
 }
