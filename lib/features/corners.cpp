@@ -77,7 +77,12 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
   const int border = std::max(config.border_px, kScoreReach);
   std::vector<Corner> accepted;
   if (config.max_corners <= 0 || gray.cols <= 2 * border || gray.rows <= 2 * border) return accepted;
-  Occupancy occupancy(gray, config.min_distance_px);
+  // A grid whose cells would hold about one corner each when all are found. Where a small picture has no room for so
+  // many at their distance, they stand closer.
+  const auto expected = static_cast<double>(taken.size()) + static_cast<double>(config.max_corners);
+  const double room_px = std::sqrt(static_cast<double>(gray.total()) / expected);
+  const double distance_px = std::min(config.min_distance_px, room_px);
+  Occupancy occupancy(gray, distance_px);
   for (const Eigen::Vector2f& pixel : taken) occupancy.add(pixel);
 
   std::vector<cv::KeyPoint> found;
@@ -87,11 +92,8 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
   };
   if (!std::is_sorted(found.begin(), found.end(), before)) std::sort(found.begin(), found.end(), before);
 
-  // A grid whose cells would hold about one corner each when all are found.
-  const auto expected = static_cast<double>(taken.size()) + static_cast<double>(config.max_corners);
-  const double cell_px = std::max(config.min_distance_px, std::sqrt(static_cast<double>(gray.total()) / expected));
-  const int columns = static_cast<int>(gray.cols / cell_px) + 1;
-  const int rows = static_cast<int>(gray.rows / cell_px) + 1;
+  const int columns = static_cast<int>(gray.cols / room_px) + 1;
+  const int rows = static_cast<int>(gray.rows / room_px) + 1;
   std::vector<std::vector<Corner>> cells(static_cast<size_t>(columns) * static_cast<size_t>(rows));
   for (const cv::KeyPoint& key : found) {
     const int u = static_cast<int>(key.pt.x), v = static_cast<int>(key.pt.y);
@@ -99,7 +101,7 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
     const Eigen::Vector2f pixel(key.pt.x, key.pt.y);
     if (!occupancy.free(pixel)) continue;
     const auto cell =
-        static_cast<size_t>(v / cell_px) * static_cast<size_t>(columns) + static_cast<size_t>(u / cell_px);
+        static_cast<size_t>(v / room_px) * static_cast<size_t>(columns) + static_cast<size_t>(u / room_px);
     cells[cell].push_back({pixel, corner_score(gray, u, v)});
   }
   for (std::vector<Corner>& cell : cells) {

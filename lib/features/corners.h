@@ -16,7 +16,7 @@ struct Corner {
 
 struct CornerConfig {
   int max_corners = 300;
-  double min_distance_px = 16.0;
+  double min_distance_px = 16.0;  ///< less where the picture has no room for max_corners so far apart
   int fast_threshold = 8;
   int border_px = 12;  ///< kept free at the edge of the picture
 };

@@ -26,7 +26,7 @@ enum class FrontEndKind { kKlt, kOrb, kSift, kSuperPoint };
 struct FrontEndConfig {
   FrontEndKind kind = FrontEndKind::kKlt;
   int max_features = 350;         ///< tracks kept alive at a time
-  double min_distance_px = 16.0;  ///< between two tracks when the second begins
+  double min_distance_px = 16.0;  ///< between two tracks when the second begins; less in a small picture
   int fast_threshold = 8;         ///< grey levels by which a corner's ring differs from its centre
   // Optical flow.
   int klt_window_px = 11;            ///< odd

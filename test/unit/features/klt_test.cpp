@@ -32,6 +32,18 @@ TEST_CASE("corners are spread, apart and away from those taken") {
   CHECK(spread_corners(cv::Mat::zeros(5, 5, CV_8UC1), {}, config).empty());
 }
 
+TEST_CASE("a small picture has as many corners, closer together") {
+  CornerConfig config;
+  config.max_corners = 350;
+  const cv::Mat quarter = texture(310, 94, 3);
+  const auto corners = spread_corners(quarter, {}, config);
+  CHECK(corners.size() > 110);  // 16 px apart there would be room for some 70
+  const double room_px = std::sqrt(310.0 * 94.0 / 350.0);
+  for (size_t i = 0; i < corners.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) REQUIRE((corners[i].pixel - corners[j].pixel).norm() >= room_px);
+  }
+}
+
 TEST_CASE("optical flow follows a moving picture under the same numbers") {
   const auto front_end = make_front_end({});
   const cv::Mat first = texture(640, 240, 5);
