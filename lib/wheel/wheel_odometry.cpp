@@ -1,6 +1,7 @@
 #include "wheel/wheel_odometry.h"
 
 #include <cmath>
+#include <utility>
 
 #include "geometry/so3.h"
 
@@ -16,6 +17,10 @@ constexpr double kUnknownAcceleration = 1.5;    ///< m/s2 per sqrt(Hz): 1.5 m/s2
 constexpr double kUnknownRate = 0.1;            ///< rad/s per sqrt(Hz): a street corner within a few seconds
 constexpr double kPlainDisturbance = 3.0;       ///< m/s2 per sqrt(Hz): 1.5 m/s2 over 2 s, uncorrected driving
 constexpr double kPlainLevelling = 0.05;        ///< s of force per levelling without wheels
+constexpr double kSpeedRateNoise = 0.2;         ///< m/s2 of wheel noise that a levelling may have, a fifth of its gate
+constexpr double kSameSpeed = 1e-6;             ///< m/s, of numbers that are meant to be equal
+constexpr int kChangesEnough = 20;              ///< of the speed, that tell in which steps it comes
+constexpr double kRounding = 1.0;               ///< s over which a rounding error stays
 constexpr double kBiasBlock = 1.0;              ///< s of standing gyro mean per bias update
 constexpr double kFirstBiasGate = 6.6;  ///< squared sigma, 99 %, of a standstill's first mean: beyond is turning
 constexpr double kBiasGate = 25.0;      ///< of the later ones, of which there may be hundreds
@@ -106,9 +111,39 @@ void WheelOdometry::align_by_plumb(double speed_rate) {
   start(tilt_of_gravity(align_force_), imu_noise().accel / std::sqrt(align_time_) / kStandardGravity);
 }
 
+/// Speeds in whole steps, as many buses carry them, differ by one step at least. Others differ by next to nothing soon.
+void WheelOdometry::watch_resolution(double speed) {
+  const double change = std::abs(speed - std::exchange(raw_speed_, speed));
+  if (change < kSameSpeed) return;
+  smallest_change_ = num_changes_ == 0 ? change : std::min(change, smallest_change_);
+  num_changes_ = std::min(num_changes_ + 1, kChangesEnough);
+}
+
+/// Of one sample, with what rounding adds.
+double WheelOdometry::wheel_noise() const { return std::hypot(config_.sensors.wheel_noise, rounding_noise(kRounding)); }
+
+/// Of one of many samples dt_s apart, (M.26a): a rounding error stays while the speed does.
+double WheelOdometry::rounding_noise(double dt_s) const {
+  if (num_changes_ < kChangesEnough) return 0.0;
+  return smallest_change_ * std::sqrt(std::max(1.0, kRounding / dt_s) / 12.0);
+}
+
+/// The newest wheel sample ends an interval once it is long enough for the wheels' noise, (M.5a).
+void WheelOdometry::level_by_wheels(std::optional<int64_t> last_us, int64_t t_us, bool slipping) {
+  const bool gap = !last_us || seconds_between(*last_us, t_us) >= config_.tuning.wheel_timeout;
+  if (slipping || gap) forget_plumb();
+  if (plumb_begin_us_) {
+    const double dt = seconds_between(*plumb_begin_us_, t_us);
+    if (dt < std::sqrt(2.0) * wheel_noise() / kSpeedRateNoise) return;
+    level_by_plumb((last_speed_ - plumb_begin_speed_) / dt);
+  }
+  plumb_begin_us_ = t_us;
+  plumb_begin_speed_ = last_speed_;
+}
+
 void WheelOdometry::level_by_plumb(double speed_rate) {
   const WheelTuning& t = config_.tuning;
-  if (plumb_time_ > 0.0 && plumb_time_ < t.wheel_timeout && !slip_since_us_) {
+  if (plumb_time_ > 0.0 && !slip_since_us_) {
     PlumbLine plumb;
     plumb.force = plumb_force_ / plumb_time_;
     plumb.gyro = plumb_gyro_ / plumb_time_;
@@ -117,7 +152,7 @@ void WheelOdometry::level_by_plumb(double speed_rate) {
     plumb.share = accelerometer_share(plumb_time_, t.tilt_time_constant);
     // The wheels' noise telescopes in the sum of their differences: (M.6) gives what is left of it.
     const double white = imu_noise().accel / std::sqrt(plumb_time_);
-    const double wheels = config_.sensors.wheel_noise * std::sqrt(2.0 / (plumb_time_ * t.tilt_time_constant));
+    const double wheels = wheel_noise() * std::sqrt(2.0 / (plumb_time_ * t.tilt_time_constant));
     const double off_g = std::abs(plumb_force(state_.x, plumb).norm() - kStandardGravity);
     if (!plumb.correct_acceleration || off_g < t.tilt_gate) level(state_, plumb, std::hypot(white, wheels));
   }
@@ -128,6 +163,7 @@ void WheelOdometry::forget_plumb() {
   plumb_force_.setZero();
   plumb_gyro_.setZero();
   plumb_time_ = 0.0;
+  plumb_begin_us_.reset();
 }
 
 void WheelOdometry::start(const Tilt& tilt, double tilt_sigma) {

@@ -88,12 +88,16 @@ class WheelOdometry {
   void learn_bias(const WheelStep& step);
   void gather_plumb(const ImuSample& imu, double dt_s);
   void align_by_plumb(double speed_rate);
+  void watch_resolution(double speed);
+  [[nodiscard]] double wheel_noise() const;
+  [[nodiscard]] double rounding_noise(double dt_s) const;
+  void level_by_wheels(std::optional<int64_t> last_us, int64_t t_us, bool slipping);
   void level_by_plumb(double speed_rate);
   void forget_plumb();
   [[nodiscard]] WheelNoise imu_noise() const;
   void use_yaw_source(bool gyro);
   [[nodiscard]] bool yaw_from_wheels() const;
-  WheelInputStatus fuse_speed(int64_t t_us, double speed, bool magnitude_only);
+  WheelInputStatus fuse_speed(int64_t t_us, double dt_s, double speed, bool magnitude_only);
   [[nodiscard]] double predicted_speed(int64_t t_us) const;
   [[nodiscard]] WheelVector speed_row() const;
   [[nodiscard]] std::optional<double> with_sign(int64_t t_us, double magnitude, double predicted, double variance);
@@ -111,7 +115,9 @@ class WheelOdometry {
   std::optional<int64_t> wheels_us_;                ///< of the newest wheel sample
   std::optional<int64_t> first_us_;                 ///< of the first input
   double last_speed_ = 0.0;                         ///< m/s, signed, of the newest wheel sample
-  double speed_rate_ = 0.0;                         ///< m/s2, of the wheels
+  double raw_speed_ = 0.0;                          ///< m/s, as it came
+  double smallest_change_ = 0.0;                    ///< m/s, of successive speeds that differ
+  int num_changes_ = 0;                             ///< of the speed, so far
   double forward_acceleration_ = 0.0;               ///< m/s2, of the imu
   std::optional<double> wheel_yaw_rate_;            ///< rad/s, of the chosen wheel source
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();  ///< rad/s, newest
@@ -125,6 +131,8 @@ class WheelOdometry {
   Eigen::Vector3d plumb_force_ = Eigen::Vector3d::Zero();  ///< m/s, specific force integrated since the last levelling
   Eigen::Vector3d plumb_gyro_ = Eigen::Vector3d::Zero();   ///< rad, likewise
   double plumb_time_ = 0.0;                                ///< s
+  std::optional<int64_t> plumb_begin_us_;                  ///< of the wheel sample since which
+  double plumb_begin_speed_ = 0.0;                         ///< m/s, signed, of that sample
   Eigen::Vector3d align_force_ = Eigen::Vector3d::Zero();  ///< m/s, corrected force integrated
   double align_time_ = 0.0;                                ///< s
   Eigen::Vector3d block_gyro_ = Eigen::Vector3d::Zero();   ///< rad, while standing

@@ -104,12 +104,13 @@ void WheelOdometry::recall(const WheelMemory& memory) {
 template <class Self, class Visitor>
 void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
   visit(self.state_.x, self.state_.P, self.started_, self.t_us_, self.imu_us_, self.wheels_us_, self.first_us_);
+  visit(self.raw_speed_, self.smallest_change_, self.num_changes_);
   visit(self.last_speed_, self.forward_acceleration_, self.wheel_yaw_rate_, self.gyro_);
   visit(self.gyro_yaw_, self.yaw_known_, self.slip_since_us_);
   visit(self.standing_.quiet_since_us, self.standing_.slow_gyro, self.standing_.quiet_gyro, self.standing_.standing,
         self.turns_standing_, self.bias_judged_);
   visit(self.direction_.sign, self.direction_.assumed, self.direction_.undecided_since_us);
-  visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_);
+  visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_, self.plumb_begin_us_, self.plumb_begin_speed_);
   visit(self.align_force_, self.align_time_, self.block_gyro_, self.block_time_);
   visit(self.mag_us_, self.mag_strength_, self.mag_dip_, self.reset_counter_);
   visit(self.recalled_, self.known_.gyro_bias, self.known_.gyro_bias_sigma);

@@ -33,6 +33,7 @@ WheelInputStatus WheelOdometry::add(const WheelSample& wheels) {
   const bool magnitude_only = wheels.direction == WheelDirection::kUnknown;
   const std::optional<int64_t> last_us = wheels_us_;
   wheels_us_ = wheels.t_us;
+  watch_resolution(motion.speed);
   wheel_yaw_rate_ = chosen_yaw_rate(motion);
 
   const bool imu_silent = seconds_between(imu_us_.value_or(*first_us_), wheels.t_us) > config_.tuning.imu_timeout;
@@ -55,11 +56,12 @@ WheelInputStatus WheelOdometry::add(const WheelSample& wheels) {
     const double gained = magnitude_only && direction_.sign == 0 ? 0.0 : sign * motion.speed - state_.x(kSpeed);
     step_blind(wheels.t_us, gained / seconds_between(t_us_, wheels.t_us));
   }
-  const WheelInputStatus status = fuse_speed(wheels.t_us, motion.speed, magnitude_only);
-  const double rate = wheel_speed_rate(last_us, wheels.t_us, sign * motion.speed);
+  const double dt_s = last_us ? seconds_between(*last_us, wheels.t_us) : 1.0;
+  const WheelInputStatus status = fuse_speed(wheels.t_us, dt_s, motion.speed, magnitude_only);
   last_speed_ = sign * motion.speed;
-  if (config_.tuning.correct_acceleration) level_by_plumb(rate);
-  watch_standing(wheels.t_us, motion.speed, status != WheelInputStatus::kSlip);
+  const bool slipping = status == WheelInputStatus::kSlip;
+  if (config_.tuning.correct_acceleration) level_by_wheels(last_us, wheels.t_us, slipping);
+  watch_standing(wheels.t_us, motion.speed, !slipping);
   return status;
 }
 
@@ -104,8 +106,8 @@ std::optional<double> WheelOdometry::with_sign(int64_t t_us, double magnitude, d
   return direction_.sign * magnitude;
 }
 
-WheelInputStatus WheelOdometry::fuse_speed(int64_t t_us, double speed, bool magnitude_only) {
-  const double noise = config_.sensors.wheel_noise * config_.sensors.wheel_noise;
+WheelInputStatus WheelOdometry::fuse_speed(int64_t t_us, double dt_s, double speed, bool magnitude_only) {
+  const double noise = std::pow(std::hypot(config_.sensors.wheel_noise, rounding_noise(dt_s)), 2);
   const WheelVector H = speed_row();
   const double predicted = predicted_speed(t_us);
   const double S = H.dot(state_.P * H) + noise;
