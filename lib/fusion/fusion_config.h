@@ -37,7 +37,7 @@ struct FusionConfig {
   double turn_sigma = 0.01;         ///< rad/s, of a yaw rate as it is measured
   double speed_sigma = 0.05;        ///< m/s, white error of a speed, beside what the channel says of it
   MotionFloor ins_floor{0.002, 0.0, 0.0, 2e-5};
-  MotionFloor vo_floor{0.005, 0.005, 0.002, 1e-4};  ///< stereo sees the way less sharply than its direction
+  MotionFloor vo_floor{0.005, 0.005, 0.002, 6e-5};  ///< stereo sees the way less sharply than its direction
   MotionFloor wheel_floor{0.01, 0.003, 0.003, 5e-4};
   double vo_jitter = 0.005;     ///< m, error of one picture's place that the next ones do not have, of a vision that
                                 ///< does not tell it
