@@ -16,6 +16,8 @@ namespace {
 constexpr double kUnknownSpeed = 30.0;  ///< m/s, standard deviation where there is a pose but no motion yet
 
 constexpr double kBraking = 4.0;       ///< m/s2, firm
+constexpr double kBump = 0.2;          ///< rad, by which a car is thrown off its motion at once
+constexpr double kTurnRate = 3.0;      ///< rad/s, more than a car turns or stops turning by
 constexpr double kSeenSpeedStd = 0.2;  ///< m/s, of a speed from two pictures
 
 /// The motion `T` stretched in time by `factor`.
@@ -175,6 +177,12 @@ void KeyframeTracker::follow(const CameraFrame& frame) {
   if (needs_keyframe(features)) make_keyframe(frame, features);
 }
 
+/// Few wrong landmarks agree on a car that lies on its side. What is expected errs by no more than this.
+bool KeyframeTracker::can_turn(const Eigen::Quaterniond& q_expected, const Eigen::Quaterniond& q_found) const {
+  const double unseen_s = t_good_us_ ? seconds_between(*t_good_us_, out_.odometry.t_us) : 0.0;
+  return log_q(q_expected.conjugate() * q_found).norm() < kBump + kTurnRate * unseen_s;
+}
+
 bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_predicted) {
   std::vector<PosePoint> points;
   std::vector<size_t> index;
@@ -193,7 +201,7 @@ bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_p
     auto found = search_pose(points, config);
     if (found && (!solution || found->num_inliers > solution->num_inliers)) solution = std::move(found);
   }
-  if (!solution) return false;
+  if (!solution || !can_turn(T_predicted.q, solution->T_map_camera.q)) return false;
   for (size_t k = 0; k < index.size(); ++k) {
     out_.features[index[k]].use = solution->inlier[k] ? FeatureUse::kInlier : FeatureUse::kOutlier;
   }

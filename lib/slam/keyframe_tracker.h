@@ -218,6 +218,7 @@ class KeyframeTracker {
   /// Pixel of a point in camera axes, lens correction included.
   [[nodiscard]] std::optional<Eigen::Vector2d> appears(const Eigen::Vector3d& p_camera) const;
   [[nodiscard]] std::vector<Feature> hints(const SE3& T_map_camera) const;
+  [[nodiscard]] bool can_turn(const Eigen::Quaterniond& q_expected, const Eigen::Quaterniond& q_found) const;
   [[nodiscard]] bool solve(const std::vector<Feature>& features, const SE3& T_predicted);
   [[nodiscard]] SharedDoubt shared_doubt() const;
   void tell_pose(const SE3& T_map_camera, const Matrix6d& cov_camera);

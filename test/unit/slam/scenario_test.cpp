@@ -76,6 +76,29 @@ TEST_CASE("a lit tunnel under way is tracked") {
   CHECK(c.error < 0.005 * c.path);
 }
 
+TEST_CASE("a picture upside down is no car on its roof") {
+  const ScenarioConfig config = shortened("city_loop", 20.0);
+  const test::TrackDrive d = test::make_track_drive(config, 4, {});
+  FedTracker tracker(exact_lens(), d.drive.config);
+  const CameraIntrinsics lens = intrinsics_of(d.drive.config.camera);
+  constexpr int kUpright = 100;
+  int frames = 0, valid = 0;
+  for (const auto& event : d.events) {
+    const auto* frame = std::get_if<test::TrackFrame>(&event);
+    if (frame == nullptr || frames == kUpright + 3) continue;
+    std::vector<TrackObservation> tracks = frame->tracks;
+    if (frames++ >= kUpright) {
+      for (TrackObservation& o : tracks) o.left = Eigen::Vector2d(2.0 * lens.cx, 2.0 * lens.cy) - o.left;
+    }
+    const TrackedFrame& out = tracker.process(frame->t_us, tracks);
+    valid += out.odometry.validity == Validity::kValid ? 1 : 0;
+    const double up = (out.odometry.T_frame_vehicle.q * Eigen::Vector3d::UnitZ()).z();
+    if (frames > kUpright) CHECK(out.odometry.validity == Validity::kCoasting);
+    CHECK(up > 0.9);
+  }
+  CHECK(valid >= kUpright - 1);
+}
+
 TEST_CASE("standing still among moving cars adds no drift") {
   TrackConfig tracks;
   tracks.noise_px = 0.2;  // what optical flow has where the picture does not change
