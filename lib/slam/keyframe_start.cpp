@@ -63,6 +63,11 @@ void KeyframeTracker::begin_map(int64_t t_us, const std::optional<FrameMotion>& 
     const double speed = motion_ && motion_->dt_s > 0.0 ? motion_->T_before_now.p.norm() / motion_->dt_s : 0.0;
     const double unseen = speed * unseen_s + 0.5 * kAcceleration * unseen_s * unseen_s;
     if (!found_back_) {
+      constexpr double kTurnRate = 0.2;  // rad/s, a street corner, about the vehicle's up, as in arrive()
+      const Eigen::Vector3d turn =
+          kTurnRate * unseen_s * (rig_.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitZ());
+      cov_keyframe_.bottomRightCorner<3, 3>() += turn * turn.transpose();
+      cov_closed_.bottomRightCorner<3, 3>() += turn * turn.transpose();
       cov_keyframe_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
       cov_closed_.topLeftCorner<3, 3>().diagonal().array() += unseen * unseen;
       out_.reset_delta = SE3{};

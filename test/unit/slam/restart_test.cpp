@@ -218,6 +218,20 @@ TEST_CASE("what coasts goes on as fast as it went, and doubts it more and more")
   }
 }
 
+TEST_CASE("a map that begins after a loss doubts the turn that nobody saw") {
+  Drive drive;
+  for (int i = 0; i < kDark; ++i) (void)drive.frame(i);
+  const Matrix6d seen = (*drive).last().odometry.cov_pose;
+  int i = kDark;
+  while (i < kFrames && !drive.frame(i).map_began) ++i;
+  REQUIRE(i < kFrames);
+  const Matrix6d& cov = (*drive).last().odometry.cov_pose;
+  const double unseen_s = 1e-6 * static_cast<double>(kPeriod_us) * (i - kDark + 1);
+  CHECK(std::sqrt(cov(5, 5)) > 0.19 * unseen_s);  // about the vehicle's up, z: 0.2 rad/s
+  CHECK(std::sqrt(cov(5, 5)) < 0.21 * unseen_s + std::sqrt(seen(5, 5)) + 0.01);
+  for (const int k : {3, 4}) CHECK(std::sqrt(cov(k, k)) < std::sqrt(seen(k, k)) + 0.01);
+}
+
 TEST_CASE("the picture that a map is lost in is the first of the next one") {
   Drive drive;
   for (int i = 0; i < kDark; ++i) (void)drive.frame(i);
