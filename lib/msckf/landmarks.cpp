@@ -9,7 +9,7 @@ namespace roadfix::msckf {
 bool PointUpdate::make_landmark(State& state, Track& track) {
   if (track.count < 2 || static_cast<int>(state.landmarks.size()) >= window_.landmarks) return false;
   const Clone& anchor = state.clone(track.seen[static_cast<size_t>(track.count - 1)].clone);
-  const auto f = triangulate(state, track.sightings(), anchor, T_left_right_, window_.sigma_px, window_.nearest);
+  const auto f = triangulate(state, straighten(state, track), anchor, T_left_right_, window_.sigma_px, window_.nearest);
   if (!f) return false;
   const int rows = linearise(state, track, anchor, *f);
   const int n = columns_->size();
@@ -25,15 +25,15 @@ bool PointUpdate::make_landmark(State& state, Track& track) {
   Eigen::Matrix<double, 3, kMaxSize> cross;
   cross.leftCols(old).setZero();
   int column = 0;
-  for (const int at : columns_->blocks()) {
-    cross.leftCols(old).noalias() -= H.middleCols(column, 6) * state.P().block(at, 0, 6, old);
-    column += 6;
+  for (const auto& [at, width] : columns_->blocks()) {
+    cross.leftCols(old).noalias() -= H.middleCols(column, width) * state.P().block(at, 0, width, old);
+    column += width;
   }
   Eigen::Matrix3d own = noise * noise.transpose();
   column = 0;
-  for (const int at : columns_->blocks()) {
-    own.noalias() -= cross.middleCols(at, 6) * H.middleCols(column, 6).transpose();
-    column += 6;
+  for (const auto& [at, width] : columns_->blocks()) {
+    own.noalias() -= cross.middleCols(at, width) * H.middleCols(column, width).transpose();
+    column += width;
   }
   const Eigen::Vector3d d = solve.solve(Eigen::Vector3d(work_.block(0, 3 + n, 3, 1)));
   const int at = state.grow(3);
@@ -63,7 +63,7 @@ Linear PointUpdate::sighting_of(const State& state, const Landmark& landmark, co
   const Eigen::Vector3d h = left.direction(landmark.f);
   by_left.topRows<2>() = weight * projection_jacobian(h);
   by_point.topRows<2>() = by_left.topRows<2>() * left.by_point();
-  r.head<2>() = weight * (point.left - h.head<2>() / h.z());
+  r.head<2>() = weight * (straightened(state.camera, point.left) - h.head<2>() / h.z());
   if (stereo) {
     const RelativeView right = right_view(left, *T_left_right_);
     const Eigen::Vector3d h_right = right.direction(landmark.f);
@@ -75,6 +75,9 @@ Linear PointUpdate::sighting_of(const State& state, const Landmark& landmark, co
   Linear linear(stereo ? 4 : 2);
   linear.block(kCameraTurn, by_left * J.camera_turn);
   linear.block(kCameraPlace, by_left * J.camera_place);
+  Eigen::Matrix<double, Eigen::Dynamic, 2, 0, 4, 2> lens = Eigen::MatrixX2d::Zero(stereo ? 4 : 2, 2);
+  lens.topRows<2>() = weight * by_lens(state.camera, h);
+  linear.block(kLens, lens);
   if (anchor.id != clone.id) {
     linear.block(anchor.at, by_left * J.anchor_turn);
     linear.block(anchor.at + 3, by_left * J.anchor_place);

@@ -68,6 +68,10 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   set(kAccelScale, 3, c.scale_std);
   set(kCameraTurn, 3, c.camera_turn_std);
   set(kCameraPlace, 3, c.camera_std);
+  if (!c.T_left_right) {
+    set(kLens, 1, config_.window.focal_std);
+    set(kLens + 1, 1, config_.window.radial_std);
+  }
   set(kTimeOffset, 1, clock_.sigma());
   set(kWheelScale, 1, c.wheel_scale_std);
   set(kMounting, 2, c.mounting_std);

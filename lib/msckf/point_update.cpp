@@ -22,14 +22,23 @@ void PointUpdate::begin(const State& state) {
   columns_.emplace(state);
   stacked_ = 0;
   int row = 0;
-  for (const int at : columns_->blocks()) {
+  for (const auto& [at, height] : columns_->blocks()) {
     int column = 0;
-    for (const int other : columns_->blocks()) {
-      P_.block<6, 6>(row, column) = state.P().block<6, 6>(at, other);
-      column += 6;
+    for (const auto& [other, width] : columns_->blocks()) {
+      P_.block(row, column, height, width) = state.P().block(at, other, height, width);
+      column += width;
     }
-    row += 6;
+    row += height;
   }
+}
+
+std::span<const Sighting> PointUpdate::straighten(const State& state, const Track& track) {
+  const auto count = static_cast<size_t>(track.count);
+  for (size_t i = 0; i < count; ++i) {
+    seen_[i] = track.seen[i];
+    seen_[i].point.left = straightened(state.camera, track.seen[i].point.left);
+  }
+  return {seen_.data(), count};
 }
 
 int PointUpdate::linearise(const State& state, const Track& track, const Clone& anchor, const Eigen::Vector3d& f) {
@@ -56,19 +65,21 @@ int PointUpdate::linearise(const State& state, const Track& track, const Clone& 
     work_.block<2, 1>(row, 3 + n) = r;
     row += 2;
   };
-  for (const Sighting& s : track.sightings()) {
+  for (size_t i = 0; i < static_cast<size_t>(track.count); ++i) {
+    const Sighting& s = seen_[i];
     const Clone& clone = state.clone(s.clone);
     const RelativeView left = left_view(state.camera, anchor, clone);
     const DirectionJacobian J = direction_jacobian(state.camera, anchor, clone, left, f);
     add(left, Eigen::Matrix3d::Identity(), J, clone, s.point.left, s.point.px);
+    work_.block<2, 2>(row - 2, 9) = s.point.px / window_.sigma_px * by_lens(state.camera, left.direction(f));
     if (T_left_right_ && s.point.right)
       add(right_view(left, *T_left_right_), T_left_right_->R().transpose(), J, clone, *s.point.right, s.point.px);
   }
   if (state.held()) {
     int column = 3;
-    for (const int at : columns_->blocks()) {
-      work_.col(3 + n).head(row) -= work_.block(0, column, row, 6) * state.expected().segment<6>(at);
-      column += 6;
+    for (const auto& [at, width] : columns_->blocks()) {
+      work_.col(3 + n).head(row) -= work_.block(0, column, row, width) * state.expected().segment(at, width);
+      column += width;
     }
   }
   return row;
@@ -101,7 +112,7 @@ void PointUpdate::add(const State& state, Track& track) {
     return;
   }
   const Clone& anchor = state.clone(track.seen.front().clone);
-  const auto f = triangulate(state, track.sightings(), anchor, T_left_right_, window_.sigma_px, window_.nearest);
+  const auto f = triangulate(state, straighten(state, track), anchor, T_left_right_, window_.sigma_px, window_.nearest);
   if (!f) {
     ++counts_.not_placed;
     track.count = 0;

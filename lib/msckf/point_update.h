@@ -43,10 +43,12 @@ class PointUpdate {
 
  private:
   static constexpr int kMaxTrackRows = 4 * kMaxClones;
-  static constexpr int kMaxColumns = 6 + 6 * kMaxClones;
+  static constexpr int kMaxColumns = Columns::kMost;
   static constexpr int kStackRows = 1024;
 
-  /// [H_f | H_x | r] of a track, whitened, into work_; the number of rows.
+  /// A track's sightings as an ideal lens would have them, into seen_.
+  std::span<const Sighting> straighten(const State& state, const Track& track);
+  /// [H_f | H_x | r] of the track that straighten() took last, whitened, into work_; the number of rows.
   int linearise(const State& state, const Track& track, const Clone& anchor, const Eigen::Vector3d& f);
   [[nodiscard]] Linear sighting_of(const State& state, const Landmark& landmark, const SeenPoint& point) const;
   bool gate(int first_row, int rows);
@@ -59,6 +61,7 @@ class PointUpdate {
   PointCounts counts_;
   Update update_;
   std::optional<Columns> columns_;
+  std::array<Sighting, kMaxClones> seen_;
   Eigen::MatrixXd work_;   ///< kMaxTrackRows x (3 + columns + 1)
   Eigen::MatrixXd stack_;  ///< kStackRows x (columns + 1)
   Eigen::MatrixXd P_;      ///< covariance of the columns

@@ -9,6 +9,7 @@ namespace roadfix::msckf {
 namespace {
 
 constexpr int kRounds = 5;
+constexpr int kLensRounds = 6;                // each leaves less than 2 c_r of the error
 constexpr double kLeastDistanceAhead = 0.05;  // of h.z, whose size is about one
 
 /// One sighting's eye, prepared for the iterations.
@@ -67,6 +68,27 @@ DirectionJacobian direction_jacobian(const Calibrated& camera, const Clone& anch
   J.camera_turn = skew(left.direction(f)) - left.B * skew(m);
   J.camera_place = f.z() * (A * anchor.R - C.transpose());
   return J;
+}
+
+Eigen::Vector2d straightened(const Calibrated& camera, const Eigen::Vector2d& seen) {
+  const Eigen::Vector2d u = seen / std::exp(camera.lens.x());
+  double radial = 1.0;
+  for (int round = 0; round < kLensRounds; ++round) {
+    const double r2 = u.squaredNorm() / (radial * radial);
+    radial = 1.0 + camera.lens.y() * r2 / (1.0 + r2);
+  }
+  return u / radial;
+}
+
+Eigen::Matrix2d by_lens(const Calibrated& camera, const Eigen::Vector3d& h) {
+  const Eigen::Vector2d n = h.head<2>() / h.z();
+  const double r2 = n.squaredNorm(), share = r2 / (1.0 + r2);
+  const double radial = 1.0 + camera.lens.y() * share;
+  Eigen::Matrix2d by_point = radial * Eigen::Matrix2d::Identity();
+  by_point += 2.0 * camera.lens.y() / ((1.0 + r2) * (1.0 + r2)) * n * n.transpose();
+  Eigen::Matrix2d by_error;
+  by_error << radial * n, share * n;
+  return by_point.inverse() * by_error;
 }
 
 Matrix2x3 projection_jacobian(const Eigen::Vector3d& h) {

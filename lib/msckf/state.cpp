@@ -65,6 +65,7 @@ void State::retract(const Eigen::VectorXd& d) {
   imu.accel_scale += part(kAccelScale);
   camera.T_imu_camera.q = (camera.T_imu_camera.q * exp_q(part(kCameraTurn))).normalized();
   camera.T_imu_camera.p += part(kCameraPlace);
+  camera.lens += d.segment<2>(kLens);
   camera.time_offset += d(kTimeOffset);
   camera.wheel_scale += d(kWheelScale);
   camera.mounting += d.segment<2>(kMounting);
@@ -153,6 +154,7 @@ void State::digest(Digest& digest) const {
     digest.add(x);
   digest.add(Eigen::Vector4d(imu.q.coeffs()));
   digest.add(Eigen::Vector4d(camera.T_imu_camera.q.coeffs()));
+  digest.add(camera.lens);
   digest.add(camera.time_offset);
   digest.add(camera.wheel_scale);
   digest.add(camera.mounting);

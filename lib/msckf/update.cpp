@@ -37,8 +37,8 @@ void Linear::expect(const State& state) {
 }
 
 Columns::Columns(const State& state) {
-  at_[static_cast<size_t>(count_++)] = kCameraTurn;
-  for (const Clone& c : state.clones) at_[static_cast<size_t>(count_++)] = c.at;
+  blocks_[count_++] = {kCameraTurn, kCamera};
+  for (const Clone& c : state.clones) blocks_[count_++] = {c.at, 6};
 }
 
 void triangulate_columns(Eigen::Ref<Eigen::MatrixXd> A, int pivots) {
@@ -81,9 +81,9 @@ void Update::add(const Linear& rows) {
 void Update::add(const Eigen::Ref<const Eigen::MatrixXd>& stack, const Columns& columns) {
   const auto count = static_cast<int>(stack.rows());
   int column = 0;
-  for (const int at : columns.blocks()) {
-    H_.block(rows_, at, count, 6) = stack.middleCols(column, 6);
-    column += 6;
+  for (const auto& [at, width] : columns.blocks()) {
+    H_.block(rows_, at, count, width) = stack.middleCols(column, width);
+    column += width;
   }
   r_.segment(rows_, count) = stack.col(column);
   rows_ += count;

@@ -63,18 +63,24 @@ class Linear {
   Eigen::Matrix<double, kMaxRows, 1> r_;
 };
 
-/// Columns of the state that a stack of rows depends on: the camera's place and every clone.
+/// Columns of the state that a stack of rows depends on: the camera and every clone.
 class Columns {
  public:
+  struct Block {
+    int at = 0, width = 0;  ///< in the state
+  };
+  static constexpr int kCamera = 8;  ///< turn, place, lens
+  static constexpr int kMost = kCamera + 6 * kMaxClones;
+
   explicit Columns(const State& state);
-  [[nodiscard]] int size() const { return 6 * count_; }
+  [[nodiscard]] int size() const { return of_clone(count_ - 1); }
   /// First column of the clone with this index in state.clones.
-  [[nodiscard]] static int of_clone(size_t index) { return 6 + 6 * static_cast<int>(index); }
-  [[nodiscard]] std::span<const int> blocks() const { return {at_.data(), static_cast<size_t>(count_)}; }
+  [[nodiscard]] static int of_clone(size_t index) { return kCamera + 6 * static_cast<int>(index); }
+  [[nodiscard]] std::span<const Block> blocks() const { return {blocks_.data(), count_}; }
 
  private:
-  std::array<int, kMaxClones + 1> at_{};
-  int count_ = 0;
+  std::array<Block, kMaxClones + 1> blocks_{};
+  size_t count_ = 0;
 };
 
 /// In-place Householder reflections: the leading `pivots` columns of A become upper triangular, all others turn along.
