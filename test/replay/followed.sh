@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # A recording of ../shared/data through vo_tracker in mode msckf: after the first valid pose none is lost. With a speed
-# limit that the drive breaks (if one is given), some are.
+# limit that the drive breaks after that (if one is given), some are.
 #   followed.sh ROADFIX DRIVE [LIMIT in m/s]
 set -euo pipefail
 roadfix=$1; drive=$(cd "$(dirname "$0")/../../.." && pwd)/shared/data/$2; limit=${3:-}
