@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/frames.h"
+
 namespace roadfix {
 
 namespace {
@@ -13,7 +15,6 @@ constexpr double kSideslipShown = 3.0;  // s since the last position, to learn t
 constexpr int64_t kDueEarly = 20'000;   // us, so that an interval of whole wheel periods is not missed by jitter
 constexpr double kWheelsSilent = 0.3;   // s without a wheel speed, after which the constraint keeps its own time
 constexpr double kBridgeRate = 0.2;     // rad/s
-constexpr double kBlindTurn = 0.5;      // s of a gap while moving, after which the heading may be anything
 constexpr double kClipTime = 1.0;       // s that a turn beyond the gyro's range lasts
 
 bool plausible(const ImuSample& s, const PropagationConfig& c) {
@@ -112,7 +113,9 @@ void GnssIns::step(const ImuSample& imu) {
   }
   // After such a time the filter has no right against the receiver.
   if (gap || monitor_.frozen() || monitor_.gyro_clipped()) agreed_since_us_ = 0;
-  if (dt > c.realign_gap || (dt > kBlindTurn && moved_meanwhile(dt))) align_again();
+  // While moving: a turn that nobody saw must fit into one of the start's hypotheses, or all are asked again.
+  const bool turned = kBridgeRate * dt > config_.alignment.heading_std_deg * kDegree;
+  if (dt > c.realign_gap || (turned && moved_meanwhile(dt))) align_again();
   if (phase_ == AlignmentPhase::kDone) {
     core_->predict(imu, dt, noise);
     step_aligned(imu, block_done);

@@ -198,3 +198,71 @@ TEST_CASE("fixes that are displaced for some seconds and then good do not make a
   CHECK(independent.honest < 0.9);
   CHECK(alike.error < independent.error);
 }
+
+namespace {
+
+struct Holes {
+  double honest = 0.0, error = 0.0;  ///< share of the level errors within three sigmas; m, the largest; over 10 s
+  int resets = 0, invalid = 0;       ///< outputs that were not valid
+};
+
+/// Positions of 2 m once a second and wheels; the IMU is silent for `hole_s` at three moments of motion, a drive each.
+/// What nobody saw is told by noise only where a gap is called a gap: `max_gap_s`.
+Holes drive_with_holes(double hole_s, double max_gap_s) {
+  Holes out;
+  int inside = 0, scored = 0;
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    ScenarioConfig s = scenario("city_loop");
+    s.duration_s = 135.0;
+    s.gnss.rate_hz = 1.0;
+    s.gnss.fix_type = FixType::kSingle;
+    s.gnss.sigma_horizontal_m = 2.0;
+    s.gnss.sigma_up_m = 4.0;
+    const SimulatedDrive drive = simulate(s, seed);
+    for (const double at : {64.0, 93.0, 118.0}) {
+      test::Samples samples(drive);
+      for (GnssFix& fix : samples.gnss) fix.velocity.reset();
+      const int64_t from = drive.imu.front().t_us + std::llround(1e6 * at), to = from + std::llround(1e6 * hole_s);
+      std::erase_if(samples.imu, [&](const ImuSample& i) { return i.t_us > from && i.t_us < to; });
+      GnssInsConfig config = test::filter_config(s);
+      config.propagation.max_gap = max_gap_s;
+      GnssIns filter(config);
+      int64_t next = to;
+      test::run(filter, samples, [&](GnssIns& f, int64_t now) {
+        f.clear_records();
+        if (now < next || now > to + 10'000'000) return;
+        next += 100'000;
+        const Odometry o = f.output().odometry;
+        if (o.validity != Validity::kValid) {
+          ++out.invalid;
+          return;
+        }
+        const auto e = test::error_of(f, o, drive);
+        for (int i = 0; i < 2; ++i) inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);
+        scored += 2;
+        out.error = std::max(out.error, e.head<2>().norm());
+      });
+      out.resets += filter.output().reset_counter;
+    }
+  }
+  out.honest = static_cast<double>(inside) / scored;
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a second without IMU samples while driving costs certainty and not the pose") {
+  const Holes second = drive_with_holes(1.0, 0.1), unsaid = drive_with_holes(1.0, 5.0),
+              longer = drive_with_holes(3.0, 0.1);
+  std::printf(
+      "a hole of 1 s: within three sigma %.3f, largest error %.1f m, %d invalid, %d resets; called no gap %.3f; "
+      "of 3 s: %d invalid, %d resets\n",
+      second.honest, second.error, second.invalid, second.resets, unsaid.honest, longer.invalid, longer.resets);
+  CHECK(second.invalid == 0);
+  CHECK(second.resets == 0);
+  CHECK(second.honest > 0.97);
+  CHECK(unsaid.honest < 0.95);
+  // After three seconds it may have turned anywhere: aligned again, which takes fixes and says so.
+  CHECK(longer.resets >= 6);
+  CHECK(longer.invalid > 100);
+}
