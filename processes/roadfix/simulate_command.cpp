@@ -100,7 +100,7 @@ void run(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   const SimulatedDrive drive = simulate(config, options.seed);
   if (!options.vehicle.empty()) {
-    write_vehicle(calibration_of(config), config.name, options.vehicle, options.overwrite);
+    write_vehicle(calibration_of(drive), config.name, options.vehicle, options.overwrite);
   }
   ThreadPool threads(options.threads > 0 ? options.threads
                                          : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));

@@ -73,22 +73,38 @@ struct EventList {
 
 void copy(const Eigen::Vector3d& from, double (&to)[3]) { std::copy(from.begin(), from.end(), to); }
 
-pose_t reference_message(const SimulatedDrive& drive, const Odometry& truth) {
-  const Eigen::Vector3d& lever = drive.config.imu.position_m;
+/// The body of poses and calibrations (config/calibration.h): the imu as it is truly mounted.
+SE3 T_vehicle_body(const SimulatedDrive& drive) { return {drive.errors.q_vehicle_imu, drive.config.imu.position_m}; }
+
+/// The truth of the imu in its own axes. With none to turn to, nothing is multiplied: zeros keep their signs.
+Odometry truth_of_body(const SE3& T_vehicle_imu, const Odometry& vehicle) {
+  Odometry imu = vehicle;
+  imu.T_frame_vehicle.p = vehicle.T_frame_vehicle * T_vehicle_imu.p;
+  imu.velocity += vehicle.angular_rate.cross(T_vehicle_imu.p);
+  if (T_vehicle_imu.q.vec().isZero(0.0)) return imu;
+  const Eigen::Quaterniond q_imu_vehicle = T_vehicle_imu.q.conjugate();
+  imu.T_frame_vehicle.q = vehicle.T_frame_vehicle.q * T_vehicle_imu.q;
+  imu.velocity = q_imu_vehicle * imu.velocity;
+  imu.angular_rate = q_imu_vehicle * vehicle.angular_rate;
+  return imu;
+}
+
+pose_t reference_message(const SimulatedDrive& drive, const Odometry& vehicle) {
+  const Odometry truth = truth_of_body(T_vehicle_body(drive), vehicle);
   const Geodetic& anchor = drive.anchor.geodetic();
   pose_t pose = empty_pose(truth.t_us, ReferenceOf::kImu);
   pose.frame = pose_t::FRAME_ENU;
   pose.anchor_lat_deg = anchor.latitude / kDegree;
   pose.anchor_lon_deg = anchor.longitude / kDegree;
   pose.anchor_height_m = anchor.height;
-  copy(truth.T_frame_vehicle * lever, pose.position_m);
+  copy(truth.T_frame_vehicle.p, pose.position_m);
   const Eigen::Quaterniond q = truth.T_frame_vehicle.q.w() < 0.0 ? Eigen::Quaterniond(-truth.T_frame_vehicle.q.coeffs())
                                                                  : truth.T_frame_vehicle.q;
   pose.q_wxyz[0] = q.w();
   pose.q_wxyz[1] = q.x();
   pose.q_wxyz[2] = q.y();
   pose.q_wxyz[3] = q.z();
-  copy(truth.velocity + truth.angular_rate.cross(lever), pose.velocity_mps);
+  copy(truth.velocity, pose.velocity_mps);
   copy(truth.angular_rate, pose.angular_rate_radps);
   return pose;
 }
@@ -112,7 +128,7 @@ config_t config_message(const SimulatedDrive& drive) {
   config.process = "drive";
   config.config_yaml = story(drive);
   config.config_yaml += config_text(facts_of(drive));
-  config.calibration_yaml = calibration_text(calibration_of(drive.config));
+  config.calibration_yaml = calibration_text(calibration_of(drive));
   config.config_hash = config_hash(config.config_yaml, config.calibration_yaml);
   return config;
 }
@@ -126,8 +142,7 @@ double joint_correlation_s(double constant, double wandering, double tau_s) {
   return std::min(tau_s * (1.0 + ratio * ratio), kLongest);
 }
 
-CameraCalibration camera_calibration(const ScenarioConfig& config, const SE3& T_vehicle_camera) {
-  const CameraConfig& camera = config.camera;
+CameraCalibration camera_calibration(const CameraConfig& camera, const SE3& T_body_camera) {
   CameraCalibration c;
   c.rate = camera.rate_hz;
   c.width_px = camera.width_px;
@@ -140,18 +155,18 @@ CameraCalibration camera_calibration(const ScenarioConfig& config, const SE3& T_
   c.colour = CameraColour::kGray;
   c.time_offset_std = std::abs(camera.link.clock_offset_s);
   c.stamp_jitter = camera.link.stamp_jitter_s;
-  const Eigen::Quaterniond& q = T_vehicle_camera.q;
-  c.mounting = CameraMounting{T_vehicle_camera.p - config.imu.position_m,
-                              {q.w(), q.x(), q.y(), q.z()},
-                              camera.mounting_std_m,
-                              camera.mounting_std_deg};
+  const Eigen::Quaterniond& q = T_body_camera.q;
+  c.mounting =
+      CameraMounting{T_body_camera.p, {q.w(), q.x(), q.y(), q.z()}, camera.mounting_std_m, camera.mounting_std_deg};
   return c;
 }
 
 }  // namespace
 
-Calibration calibration_of(const ScenarioConfig& config) {
+Calibration calibration_of(const SimulatedDrive& drive) {
+  const ScenarioConfig& config = drive.config;
   const ImuConfig& imu = config.imu;
+  const SE3 T_body_vehicle = T_vehicle_body(drive).inverse();
   Calibration c;
   c.body_origin = BodyOrigin::kImu;
   c.mounting = MountingCalibration{Eigen::Vector3d(imu.mounting_std_rad / kDegree)};
@@ -169,7 +184,7 @@ Calibration calibration_of(const ScenarioConfig& config) {
   const GnssConfig& gnss = config.gnss;
   if (gnss.rate_hz > 0.0) {
     c.sensors.gnss =
-        GnssCalibration{gnss.rate_hz, Eigen::Vector3d(gnss.lever_arm_m - imu.position_m), HeightKind::kEllipsoid,
+        GnssCalibration{gnss.rate_hz, Eigen::Vector3d(T_body_vehicle * gnss.lever_arm_m), HeightKind::kEllipsoid,
                         std::abs(gnss.position_latency_s), std::abs(gnss.velocity_latency_s)};
   }
   const WheelsConfig& wheels = config.wheels;
@@ -182,9 +197,10 @@ Calibration calibration_of(const ScenarioConfig& config) {
   }
   if (config.camera.layout != CameraLayout::kNone) {
     const SE3 T_vehicle_left = nominal_T_vehicle_left(config.camera);
-    c.sensors.camera_left = camera_calibration(config, T_vehicle_left);
+    c.sensors.camera_left = camera_calibration(config.camera, T_body_vehicle * T_vehicle_left);
     if (config.camera.layout == CameraLayout::kStereo) {
-      c.sensors.camera_right = camera_calibration(config, T_vehicle_left * T_left_right(config.camera));
+      c.sensors.camera_right =
+          camera_calibration(config.camera, T_body_vehicle * (T_vehicle_left * T_left_right(config.camera)));
       c.sensors.stereo = StereoCalibration{0.0, 0.0};  // the drive is rendered through these very lenses
     }
   }

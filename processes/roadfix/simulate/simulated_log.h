@@ -1,8 +1,8 @@
 /// A simulated drive as an LCM log and a vehicle configuration, like those of `roadfix import`.
 ///
 /// The log's order and event times are those of arrival; pictures are stamped with the middle of their exposure.
-/// REFERENCE is exact, of the imu's origin, in vehicle axes, with velocity and angular rate; CONFIG_DRIVE comes first.
-/// The same drive gives the same bytes.
+/// REFERENCE is exact, of the imu's origin, in body axes, with velocity and angular rate; CONFIG_DRIVE comes first.
+/// Body: the imu as it is mounted, config/calibration.h. The same drive gives the same bytes.
 #pragma once
 
 #include <filesystem>
@@ -17,8 +17,8 @@
 namespace roadfix {
 
 /// What a careful owner would know of the simulated vehicle: nominal values, and the sigmas that its errors were drawn
-/// from.
-Calibration calibration_of(const ScenarioConfig& config);
+/// from. Lever arm and cameras are measured from the imu, in its axes; how it sits in the vehicle is known to a sigma.
+Calibration calibration_of(const SimulatedDrive& drive);
 
 /// How the drive is to be scored; each GNSS silence is an outage.
 DriveFacts facts_of(const SimulatedDrive& drive);

@@ -134,6 +134,47 @@ TEST_CASE("REFERENCE is the truth at the imu") {
   }
 }
 
+// Exact sensors, so each of them tells how the imu truly sits.
+TEST_CASE("REFERENCE and lever arm are in the axes of an imu that sits askew") {
+  const test::TemporaryFolder folder;
+  ScenarioConfig config = scenario("city_loop");
+  config.duration_s = 60.0;
+  config.imu.position_m = {1.0, 0.2, 0.5};
+  config.imu.mounting_std_rad = {0.09, 0.09, 0.09};
+  config.imu.gyro_noise_radps_per_rthz = config.imu.gyro_bias_std_radps = config.imu.gyro_bias_drift_std_radps = 0.0;
+  config.imu.gyro_scale_std = config.gnss.sigma_horizontal_m = config.gnss.sigma_up_m = 0.0;
+  const SimulatedDrive drive = simulate(config, 5);
+  REQUIRE(drive.errors.q_vehicle_imu.vec().norm() > 0.02);
+  write(drive, folder / "drive.lcm");
+  std::map<std::int64_t, pose_t> reference;
+  for (const pose_t& pose : messages<pose_t>(folder / "drive.lcm", "REFERENCE")) reference[pose.utime] = pose;
+  double turning = 0.0;
+  for (const ImuSample& sample : drive.imu) {
+    const auto pose = reference.find(sample.t_us);
+    if (pose == reference.end()) continue;
+    const Eigen::Map<const Eigen::Vector3d> rate(pose->second.angular_rate_radps);
+    turning = std::max(turning, rate.norm());
+    REQUIRE((sample.gyro - rate).norm() < 0.006);  // a mean over 10 ms, and the Earth's rate
+  }
+  CHECK(turning > 0.3);
+  const Eigen::Vector3d lever = *calibration_of(drive).sensors.gnss->lever_arm;
+  int fixes = 0;
+  for (const GnssFix& fix : drive.gnss) {
+    const auto found = reference.find(fix.t_us);
+    if (found == reference.end()) continue;
+    const pose_t& pose = found->second;
+    const Eigen::Quaterniond q(pose.q_wxyz[0], pose.q_wxyz[1], pose.q_wxyz[2], pose.q_wxyz[3]);
+    const Eigen::Vector3d antenna = q * lever + Eigen::Map<const Eigen::Vector3d>(pose.position_m);
+    REQUIRE((antenna - drive.anchor.enu(fix.antenna)).norm() < 1e-6);
+    const Eigen::Vector3d velocity = q * Eigen::Map<const Eigen::Vector3d>(pose.velocity_mps);
+    const Odometry truth = drive.truth_at(fix.t_us);
+    const Eigen::Vector3d in_vehicle = truth.velocity + truth.angular_rate.cross(config.imu.position_m);
+    REQUIRE((velocity - truth.T_frame_vehicle.q * in_vehicle).norm() < 1e-9);
+    ++fixes;
+  }
+  CHECK(fixes > 100);
+}
+
 TEST_CASE("the silence of the receiver is an outage of the facts") {
   const SimulatedDrive drive = short_drive();
   const DriveFacts facts = facts_of(drive);
@@ -187,10 +228,10 @@ TEST_CASE("logs/demo.lcm and configs/demo are what their command makes") {
   const test::TemporaryFolder folder;
   const std::filesystem::path committed = test::source_path("logs/demo.lcm");
   const ScenarioConfig config = load_scenario("demo");
-  CHECK(calibration_text(load_calibration(test::source_path("configs/demo"))) ==
-        calibration_text(calibration_of(config)));
   CHECK(std::filesystem::file_size(committed) < 25'000'000);
   SimulatedDrive drive = simulate(config, 1);
+  CHECK(calibration_text(load_calibration(test::source_path("configs/demo"))) ==
+        calibration_text(calibration_of(drive)));
   const auto pictures = messages<image_t>(committed, "CAMERA_LEFT");
   REQUIRE(pictures.size() == drive.pictures_left.size());
   CHECK(pictures.back().utime == drive.pictures_left.back().t_us);

@@ -144,19 +144,22 @@ TEST_CASE("damaged files are damaged in their time, most do not decode to the pi
 TEST_CASE("the calibration says where the cameras are, and a drive without them none") {
   ScenarioConfig config = stereo();
   config.imu.position_m = {0.8, 0.1, 0.4};
+  config.imu.mounting_std_rad = {0.09, 0.09, 0.09};
   config.camera.distortion = {-0.2, 0.05, 1e-3, -1e-3};
-  const Calibration c = parse_calibration(calibration_text(calibration_of(config)), "calibration");
+  const SimulatedDrive drive = simulate(config, 1);
+  REQUIRE(drive.errors.q_vehicle_imu.vec().norm() > 0.02);
+  const Calibration c = parse_calibration(calibration_text(calibration_of(drive)), "calibration");
   const CameraCalibration& left = *c.sensors.camera_left;
   const SE3 T_body_left = left.mounting->T_body_camera();
-  const SE3 T_vehicle_left = SE3{Eigen::Quaterniond::Identity(), config.imu.position_m} * T_body_left;
-  CHECK(local(T_vehicle_left, rig_of(simulate(config, 1)).T_vehicle_left).norm() < 1e-12);
+  const SE3 T_vehicle_left = SE3{drive.errors.q_vehicle_imu, config.imu.position_m} * T_body_left;
+  CHECK(local(T_vehicle_left, rig_of(drive).T_vehicle_left).norm() < 1e-12);
   CHECK((T_body_left.inverse() * c.sensors.camera_right->mounting->T_body_camera()).p.x() == Approx(0.54));
   CHECK(*left.intrinsics_px == config.camera.intrinsics_px);
   CHECK(left.distortion->coefficients == std::vector<double>{-0.2, 0.05, 1e-3, -1e-3});
   config.camera.layout = CameraLayout::kMono;
-  CHECK_FALSE(calibration_of(config).sensors.camera_right);
+  CHECK_FALSE(calibration_of(simulate(config, 1)).sensors.camera_right);
   config.camera.layout = CameraLayout::kNone;
-  CHECK_FALSE(calibration_of(config).sensors.camera_left);
+  CHECK_FALSE(calibration_of(simulate(config, 1)).sensors.camera_left);
 }
 
 }  // namespace
