@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -64,7 +65,8 @@ struct LocalPose {
 };
 
 struct Drive {
-  std::string format;  ///< folder, kitti, euroc or poses
+  std::string format;                                  ///< folder, kitti, euroc or poses
+  std::map<std::string, std::filesystem::path> files;  ///< of a drive folder, by their name without .csv
   DriveDescription description;
   std::vector<ImuSample> imu;
   std::vector<GnssFix> gnss;

@@ -227,13 +227,18 @@ DriveFolder read_drive_folder(const fs::path& folder) {
   const auto& gnss = drive.description.calibration.sensors.gnss;
   const HeightKind height = gnss ? gnss->height.value_or(HeightKind::kUnknown) : HeightKind::kUnknown;
   const ReferenceDescription& reference = drive.description.reference;
-  if (const auto path = find_csv(folder, "imu.csv")) drive.imu = read_imu(*path);
-  if (const auto path = find_csv(folder, "gnss.csv")) drive.gnss = read_gnss(*path, height);
-  if (const auto path = find_csv(folder, "wheels.csv")) drive.wheels = read_wheels(*path);
-  if (const auto path = find_csv(folder, "mag.csv")) drive.mag = read_mag(*path);
-  if (const auto path = find_csv(folder, "frames_left.csv")) drive.frames_left = read_frames(*path, folder);
-  if (const auto path = find_csv(folder, "frames_right.csv")) drive.frames_right = read_frames(*path, folder);
-  const auto reference_path = find_csv(folder, "reference.csv");
+  const auto find = [&](const std::string& name) {
+    const auto path = find_csv(folder, name + ".csv");
+    if (path) drive.files[name] = *path;
+    return path;
+  };
+  if (const auto path = find("imu")) drive.imu = read_imu(*path);
+  if (const auto path = find("gnss")) drive.gnss = read_gnss(*path, height);
+  if (const auto path = find("wheels")) drive.wheels = read_wheels(*path);
+  if (const auto path = find("mag")) drive.mag = read_mag(*path);
+  if (const auto path = find("frames_left")) drive.frames_left = read_frames(*path, folder);
+  if (const auto path = find("frames_right")) drive.frames_right = read_frames(*path, folder);
+  const auto reference_path = find("reference");
   if (reference_path) drive.reference = read_reference(*reference_path, reference);
   if (!reference_path && reference.of != ReferenceOf::kNone) {
     throw ConfigError((folder / "reference.csv").string(), 0, "no such file, but drive.yaml has reference.of");

@@ -14,6 +14,7 @@
 #include "config/config_hash.h"
 #include "roadfix/import/drive_messages.h"
 #include "roadfix/import/drive_reference.h"
+#include "roadfix/import/time_spans.h"
 
 namespace roadfix {
 namespace {
@@ -182,6 +183,7 @@ const std::vector<std::string>& sensor_names() {
 DriveLogSummary write_drive_log(Drive drive, const ImportChanges& changes, const fs::path& path,
                                 const Progress& progress) {
   leave_out(changes.without, drive);
+  refuse_times_apart(drive);
   drop_start(changes.start_after, drive);
   if (changes.score_skip) drive.description.score.skip_s = *changes.score_skip;
   const bool asks_gnss = changes.gnss.cut || changes.gnss.spike || changes.gnss.keep_every > 1;

@@ -1,6 +1,8 @@
 // The command itself: exit codes and words that a user meets.
 #include <catch2/catch.hpp>
 #include <cstdlib>
+#include <functional>
+#include <sstream>
 
 #include <sys/wait.h>
 
@@ -38,6 +40,47 @@ TEST_CASE("import writes a log and a vehicle and says what went in") {
   CHECK(fs::exists(folder / "configs/small/gnss_ins_ekf.yaml"));
   CHECK(import(folder.path(), "drive --out b.lcm --vehicle configs/small --format folder").code == 0);
   CHECK(test::read_file(folder / "a.lcm") == test::read_file(folder / "b.lcm"));
+}
+
+TEST_CASE("files whose times share no moment are refused with both spans and what to do") {
+  const test::TemporaryFolder folder;
+  const fs::path drive = folder / "drive";
+  const auto with_stamps = [&](const std::string& file, const std::function<int64_t(int64_t)>& change) {
+    fs::remove_all(drive);
+    fs::create_directories(drive);
+    test::write_small_drive(drive);
+    std::istringstream lines(test::read_file(drive / file));
+    std::string text, line;
+    std::getline(lines, text);
+    while (std::getline(lines, line)) {
+      const std::size_t comma = line.find(',');
+      text += "\n" + std::to_string(change(std::stoll(line.substr(0, comma)))) + line.substr(comma);
+    }
+    test::write_file(drive / file, text + "\n");
+    return import(folder.path(), "drive --out a.lcm");
+  };
+  const std::string spans =
+      " shares no moment with drive/imu.csv, 1700000000000000 to 1700000002950000: it looks like ";
+  const std::string advice = "; give both in microseconds of one clock, or leave a sensor out with --without";
+  Outcome outcome = with_stamps("gnss.csv", [](int64_t t_us) { return t_us / 1000; });
+  CHECK(outcome.code == 2);
+  CHECK_THAT(outcome.text, Catch::Contains("drive/gnss.csv: utime_us from 1700000000000 to 1700000002750" + spans +
+                                           "milliseconds" + advice));
+  CHECK_FALSE(fs::exists(folder / "a.lcm"));
+  CHECK(import(folder.path(), "drive --out a.lcm --without gnss").code == 0);
+  outcome = with_stamps("wheels.csv", [](int64_t t_us) { return t_us / 1'000'000; });
+  CHECK(outcome.code == 2);
+  CHECK_THAT(outcome.text,
+             Catch::Contains("drive/wheels.csv: utime_us from 1700000000 to 1700000002" + spans + "seconds" + advice));
+  outcome = with_stamps("imu.csv", [](int64_t t_us) { return t_us / 1000; });
+  CHECK_THAT(outcome.text, Catch::Contains("drive/imu.csv: utime_us from 1700000000000 to 1700000002950") &&
+                               Catch::Contains("it looks like milliseconds"));
+  outcome = with_stamps("mag.csv", [](int64_t t_us) { return t_us + 3'600'000'000; });  // an hour: another clock
+  CHECK(outcome.code == 2);
+  CHECK_THAT(outcome.text, Catch::Contains("drive/mag.csv") && !Catch::Contains("looks like"));
+  CHECK(import(folder.path(), "drive --out a.lcm --without mag").code == 0);
+  CHECK(with_stamps("gnss.csv", [](int64_t t_us) { return t_us + 2'900'000; }).code ==
+        0);  // with the IMU 50 ms, with pictures none
 }
 
 TEST_CASE("a user's mistake ends with exit code 2 and a line that names it") {
