@@ -11,6 +11,7 @@ namespace {
 constexpr double kFirstDamping = 1e-4;
 constexpr double kEnoughGain = 1e-5;     ///< relative
 constexpr double kHiddenCost = 100.0;    ///< of an observation whose point is not in front of its camera
+constexpr double kDistanceHuber = 5.0;   ///< sigmas beyond which a measured distance counts linearly
 constexpr double kMinSeparation = 1e-6;  ///< m; nearer views have no direction to push
 
 /// Huber's cost of a squared error, and the weight that reweighted least squares gives it.
@@ -129,7 +130,7 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
   for (const BundleProblem::Distance& d : problem.distances) {
     const Eigen::Vector3d between = separation(problem, d);
     const double length = between.norm(), residual = (d.distance - length) / d.sigma;
-    const double huber = d.measured ? problem.huber : std::numeric_limits<double>::infinity();
+    const double huber = d.measured ? kDistanceHuber : std::numeric_limits<double>::infinity();
     const double root_weight = std::sqrt(robust_weight(residual * residual, huber));
     result.cost += robust_cost(residual * residual, huber);
     if (length < kMinSeparation) continue;

@@ -29,7 +29,7 @@ struct BundleProblem {
     int view_b = 0;
     double distance = 0.0;
     double sigma = 0.0;
-    bool measured = false;  ///< and may be far off, as a wheel slips: counts linearly beyond `huber` sigmas
+    bool measured = false;  ///< and may be far off, as a wheel slips: counts linearly beyond five sigmas
   };
 
   std::vector<View> views;
