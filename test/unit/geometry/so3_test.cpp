@@ -18,7 +18,7 @@ std::vector<Eigen::Vector3d> tangents() {
   std::mt19937_64 generator(7);
   std::uniform_real_distribution<double> uniform(-1.7, 1.7);
   for (int i = 0; i < 20; ++i) all.emplace_back(uniform(generator), uniform(generator), uniform(generator));
-  all.push_back(Eigen::Vector3d(1.0, 2.0, -2.0) / 3.0 * (kPi - 1e-7));
+  all.emplace_back(Eigen::Vector3d(1.0, 2.0, -2.0) / 3.0 * (kPi - 1e-7));
   return all;
 }
 

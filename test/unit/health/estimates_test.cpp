@@ -174,7 +174,7 @@ TEST_CASE("innovations: honest ones pass, ten times too large ones and refused o
     std::mt19937_64 random(7);
     std::normal_distribution<double> normal;
     car.tick = [&](double t) {
-      if (static_cast<int>(t * 100 + 0.5) % 25 != 0) return;
+      if (std::lround(t * 100) % 25 != 0) return;
       double nis = 0.0;
       for (int i = 0; i < 3; ++i) nis += std::pow(normal(random), 2);
       car.health.measurement("GNSS position in INS", test::at(t), factor * nis, 3, !refused);
@@ -222,7 +222,7 @@ TEST_CASE("refusals before a source's reset are not held against it; without a r
   const auto told_until = [](const std::string& resets) {
     SmallCar car;
     car.tick = [&](double t) {
-      const int i = static_cast<int>(t * 100.0 + 0.5);
+      const int i = static_cast<int>(std::lround(t * 100.0));
       if (i % 10 != 0) return;
       const bool refused = faulty(t) || (t >= kMended && i % 30 == 0);  // now and then afterwards too
       car.health.measurement("POSE_INS in FUSION", test::at(t), refused ? 30.0 : 1.0, 3, !refused);

@@ -75,7 +75,7 @@ TEST_CASE("a sensor at half its rate") {
   int64_t sent = 0;
   car.arrival = [&](const std::string& channel, double t, Arrival& a) {
     if (channel != "IMU") return true;
-    if (faulty(t) && static_cast<int>(t * 100 + 0.5) % 2 == 1) return false;
+    if (faulty(t) && std::lround(t * 100) % 2 == 1) return false;
     a.seq = sent++;
     return true;
   };

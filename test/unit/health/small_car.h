@@ -2,6 +2,7 @@
 // one thing and looks when the verdict follows.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -12,7 +13,7 @@ namespace roadfix::test {
 constexpr int64_t kStart_us = 1'700'000'000'000'000;
 constexpr double kSpeed = 15.0;
 
-inline int64_t at(double s) { return kStart_us + static_cast<int64_t>(s * 1e6 + 0.5); }
+inline int64_t at(double s) { return kStart_us + std::llround(s * 1e6); }
 
 struct SmallCar {
   Health health;
@@ -52,7 +53,7 @@ struct SmallCar {
   /// Until `to` seconds; `watch` sees every decision.
   void drive(
       double from, double to, const std::function<void(double t)>& watch = [](double) {}) {
-    for (int i = static_cast<int>(from * 100 + 0.5); i < static_cast<int>(to * 100 + 0.5); ++i) {
+    for (int i = static_cast<int>(std::lround(from * 100)); i < std::lround(to * 100); ++i) {
       const double t = i * 0.01;
       while (const auto due = health.next_decision(at(t))) {
         health.decide(*due);

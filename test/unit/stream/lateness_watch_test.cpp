@@ -6,7 +6,7 @@ using namespace roadfix;
 
 namespace {
 
-constexpr int kClock = 0, kVision = 1, kWheel = 2;
+constexpr int kVision = 1, kWheel = 2;  // inputs; 0 is the clock
 constexpr int64_t kMs = 1000;
 
 LatenessWatch some_watch() {
