@@ -228,7 +228,7 @@ DriveFolder read_drive_folder(const fs::path& folder) {
   const HeightKind height = gnss ? gnss->height.value_or(HeightKind::kUnknown) : HeightKind::kUnknown;
   const ReferenceDescription& reference = drive.description.reference;
   const auto find = [&](const std::string& name) {
-    const auto path = find_csv(folder, name + ".csv");
+    auto path = find_csv(folder, name + ".csv");
     if (path) drive.files[name] = *path;
     return path;
   };
