@@ -17,7 +17,7 @@ constexpr double kUnknownSpeed = 30.0;  ///< m/s, standard deviation where there
 
 constexpr double kBraking = 4.0;       ///< m/s2, firm
 constexpr double kBump = 0.2;          ///< rad, by which a car is thrown off its motion at once
-constexpr double kTurnRate = 3.0;      ///< rad/s, more than a car turns or stops turning by
+constexpr double kFastestTurn = 3.0;   ///< rad/s, more than a car turns or stops turning by
 constexpr double kSeenSpeedStd = 0.2;  ///< m/s, of a speed from two pictures
 
 /// The motion `T` stretched in time by `factor`.
@@ -180,7 +180,7 @@ void KeyframeTracker::follow(const CameraFrame& frame) {
 /// Few wrong landmarks agree on a car that lies on its side. What is expected errs by no more than this.
 bool KeyframeTracker::can_turn(const Eigen::Quaterniond& q_expected, const Eigen::Quaterniond& q_found) const {
   const double unseen_s = t_good_us_ ? seconds_between(*t_good_us_, out_.odometry.t_us) : 0.0;
-  return log_q(q_expected.conjugate() * q_found).norm() < kBump + kTurnRate * unseen_s;
+  return log_q(q_expected.conjugate() * q_found).norm() < kBump + kFastestTurn * unseen_s;
 }
 
 bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_predicted) {

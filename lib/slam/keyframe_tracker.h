@@ -261,7 +261,7 @@ class KeyframeTracker {
   Matrix6d cov_keyframe_ = Matrix6d::Zero();  ///< of the last keyframe's camera pose, grown along the way, (M.14)
   Matrix6d cov_own_ = Matrix6d::Zero();       ///< what of it this map has added
   Matrix6d cov_window_ = Matrix6d::Zero();    ///< of the last keyframe against those that are held, (M.16)
-  Matrix6d cov_closed_ = Matrix6d::Zero();    ///< the same of the pose with all loops closed
+  Matrix6d cov_closed_ = Matrix6d::Zero();    ///< like cov_keyframe_, with all loops closed
   SharedError shared_, shared_closed_;        ///< of the last pose told, and of it with all loops closed
   LoopCloser loops_;
   std::optional<int64_t> t_begun_us_;  ///< when the map began

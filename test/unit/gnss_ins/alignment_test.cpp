@@ -127,10 +127,7 @@ struct Askew {
 ScenarioConfig poor_start() {
   ScenarioConfig s = scenario("city_loop");
   s.duration_s = 110.0;
-  s.gnss.rate_hz = 1.0;
-  s.gnss.fix_type = FixType::kSingle;
-  s.gnss.sigma_horizontal_m = 2.0;
-  s.gnss.sigma_up_m = 4.0;
+  test::give_poor_fixes(s);
   s.gnss.sigma_velocity_mps = 0.0;
   s.imu.mounting_std_rad = Eigen::Vector3d(0.0, 0.02, 5.0 * kDegree);
   return s;

@@ -214,10 +214,7 @@ Holes drive_with_holes(double hole_s, double max_gap_s) {
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     ScenarioConfig s = scenario("city_loop");
     s.duration_s = 135.0;
-    s.gnss.rate_hz = 1.0;
-    s.gnss.fix_type = FixType::kSingle;
-    s.gnss.sigma_horizontal_m = 2.0;
-    s.gnss.sigma_up_m = 4.0;
+    test::give_poor_fixes(s);
     const SimulatedDrive drive = simulate(s, seed);
     for (const double at : {64.0, 93.0, 118.0}) {
       test::Samples samples(drive);

@@ -11,6 +11,14 @@
 
 namespace roadfix::test {
 
+/// Single fixes of 2 m, once a second.
+inline void give_poor_fixes(ScenarioConfig& s) {
+  s.gnss.rate_hz = 1.0;
+  s.gnss.fix_type = FixType::kSingle;
+  s.gnss.sigma_horizontal_m = 2.0;
+  s.gnss.sigma_up_m = 4.0;
+}
+
 /// What a calibration of this simulated car says.
 inline GnssInsConfig filter_config(const ScenarioConfig& s) {
   GnssInsConfig c;
