@@ -249,6 +249,7 @@ class Fusion {
   bool vo_scale_open_ = true;  ///< a non-metric vision's scale has no value yet
   ReturnState comeback_;
   PlanarEstimate local_;
+  LastingVelocity lasting_;  ///< of the local pose
   double local_height_ = 0.0;
   double local_height_variance_ = 0.0;
 };

@@ -149,7 +149,7 @@ Fusion::Poses Fusion::carried(const Ahead& a) const {
 
   PlanarEstimate l = local_;
   if (a.dt > 0.0) {
-    l = moved_along(local_, now_.planar, f.way, f.planar.P);
+    l = moved_along(local_, now_.planar, f.way, f.planar.P, lasting_.grown(local_.pose.z(), a.dt));
   }
   out.local = out.fused;
   const Odometry placed =

@@ -31,7 +31,11 @@ void Fusion::follow_local(const Before& before, const PlanarMixture& now) {
     take_fix(comeback_, config_.comeback, {shift.x(), shift.y(), 0.0}, false);
     motion = driven;
   }
-  local_ = moved_along(local_, before.at.planar, motion, now.planar.P);
+  const double yaw = local_.pose.z();
+  local_ = moved_along(local_, before.at.planar, motion, now.planar.P, lasting_.grown(yaw, before.dt));
+  lasting_.carry(
+      yaw, before.dt,
+      {std::min(attitude_.cov_velocity(0, 0), combined_variance(imm_, kSpeed)), attitude_.cov_velocity(1, 1)});
 }
 
 /// Height by the channel that speaks for the motion: its own step, with what its covariance grows by. Where another
@@ -124,6 +128,7 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);
+  LastingVelocity::visit_members(self.lasting_, visit);
 }
 
 void Fusion::save(StateWriter& writer) const {

@@ -201,13 +201,24 @@ Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, c
 }
 
 PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
-                           const Eigen::Matrix3d& P_end) {
-  const Eigen::Matrix3d R =
-      motion_covariance(start.pose, start.P, motion, P_end, Eigen::Vector3d::Constant(kLocalFloor));
+                           const Eigen::Matrix3d& P_end, const Eigen::Vector2d& least) {
+  Eigen::Matrix3d R = motion_covariance(start.pose, start.P, motion, P_end, Eigen::Vector3d::Constant(kLocalFloor));
+  R.diagonal().head<2>() = R.diagonal().head<2>().cwiseMax(least);
   const double c = std::cos(other.pose.z()), s = std::sin(other.pose.z());
   const Eigen::Vector2d way(c * motion.x() - s * motion.y(), s * motion.x() + c * motion.y());
   return {{other.pose.x() + way.x(), other.pose.y() + way.y(), wrap_angle(other.pose.z() + motion.z())},
           carried_along(other.P, way) + turned(R, c, s)};
+}
+
+Eigen::Vector2d LastingVelocity::grown(double yaw, double dt) const {
+  return dt * (2.0 * (rotation(-yaw) * common_).diagonal() + dt * variances_);
+}
+
+void LastingVelocity::carry(double yaw, double dt, const Eigen::Vector2d& variances) {
+  common_ += dt * rotation(yaw) * variances_.asDiagonal();
+  for (int i = 0; i < 2; ++i)
+    if (variances(i) < variances_(i)) common_.col(i) *= variances(i) / variances_(i);
+  variances_ = variances;
 }
 
 double height_growth(double way, double dt) {

@@ -82,6 +82,48 @@ TEST_CASE("the literal scheme of independent absolute poses is overconfident") {
   CHECK(outcome(literal).nees > 3.0);
 }
 
+/// NEES of the local pose's motion since the fifth second, in the plane, with fixes all the way.
+double local_nees(double noise) {
+  ScenarioConfig s = scenario("city_loop");
+  s.duration_s = 60.0;
+  s.imu.rate_hz = s.wheels.rate_hz = s.gnss.rate_hz = 1.0;
+  s.mag.rate_hz = 0.0;
+  const double epochs[] = {5.0, 10.0, 15.0, 30.0, 59.0};
+  ConsistencyAccumulator nees;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const SimulatedDrive drive = simulate(s, seed);
+    test::InsNoise ins;
+    ins.claimed = 1.0 / noise;
+    Fusion fusion(FusionConfig{});
+    std::size_t epoch = 0;
+    Planar start = Planar::Zero(), truth_start = Planar::Zero();
+    run(fusion, ins_stream(drive, ins, seed), [&](const Fusion& f, const test::StreamEvent&) {
+      if (epoch == std::size(epochs) || seconds_between(s.start_utime, f.t_us()) < epochs[epoch]) return;
+      const Odometry local = f.local();
+      const Planar pose = planar_pose(local);
+      const Planar truth = pose + test::planar_error(drive, local).error;
+      if (epoch++ == 0) {
+        start = pose;
+        truth_start = truth;
+        return;
+      }
+      const Planar driven = motion_between(start, pose), way = motion_between(truth_start, truth);
+      const Planar error = difference_of(way, driven);
+      const Eigen::Matrix3d P = turned(planar_covariance(local), std::cos(start.z()), -std::sin(start.z()));
+      nees.add(error.dot(P.ldlt().solve(error)), 3);
+    });
+  }
+  WARN("NEES of the local pose " << nees.ratio());
+  return nees.ratio();
+}
+
+TEST_CASE("the local pose's covariance holds what the velocity's error adds up to") {
+  const double nees = local_nees(1.0);
+  CHECK(nees < 1.3);
+  CHECK(nees > 0.3);
+  CHECK(local_nees(2.0) > 1.3);  // teeth: an INS that claims half its sigma
+}
+
 TEST_CASE("teeth: an INS that claims half its sigma is seen") { CHECK(outcome({}, 2.0).nees > 1.3); }
 
 }  // namespace
