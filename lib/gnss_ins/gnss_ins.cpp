@@ -140,6 +140,7 @@ void GnssIns::align_again() {
   unseen_ = false;
   agreed_since_us_ = 0;
   jump_ = JumpJudge();
+  wheel_doubt_ = WheelDoubt();
   forward_stale_ = true;
   lag_us_ = lag_of(prior_age(config_.vehicle));
 }

@@ -17,6 +17,7 @@
 #include "gnss_ins/heading_bank.h"
 #include "gnss_ins/imu_ring.h"
 #include "gnss_ins/jump_judge.h"
+#include "gnss_ins/wheel_doubt.h"
 
 namespace roadfix {
 
@@ -87,6 +88,7 @@ class GnssIns {
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
   void use_position(const Pending& measured);
+  void ask_wheels(const Pending& velocity, const AidingRecord& r);
   void show_anew(const Pending& p);
   void begin_return(const Pending& p);
   void weigh_by_itself(const Pending& measured, NoiseScale& noise);
@@ -143,6 +145,7 @@ class GnssIns {
   int64_t refused_since_us_ = 0;
   int refused_ = 0;
   JumpJudge jump_;
+  WheelDoubt wheel_doubt_;
   int64_t agreed_since_us_ = 0;  // first position taken since the last start or recovery
   int64_t recovered_at_us_ = 0;
   int64_t height_refused_since_us_ = 0;  // 0: the last position agreed in height as well

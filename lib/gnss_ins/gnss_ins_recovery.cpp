@@ -32,6 +32,7 @@ void GnssIns::use(const Pending& measured) {
     const AidingRecord r = applier_.apply(*core_, p, gates_);
     velocity_noise_.learn(r);
     note(r, p.id);
+    if (p.fix_type == FixType::kRtkFixed) ask_wheels(p, r);
   } else if (p.kind == PendingKind::kMag && core_->heading_std() < config_.aiding.mag_std) {
     // Its errors do not average out: once the heading is better than the magnetometer, it only harms.
     AidingRecord r;
@@ -40,8 +41,31 @@ void GnssIns::use(const Pending& measured) {
     r.status = AidingStatus::kDisabled;
     note(r, p.id);
   } else {
-    note(applier_.apply(*core_, p, gates_), p.id);
+    const AidingRecord r = applier_.apply(*core_, p, gates_);
+    if (p.kind == PendingKind::kWheels && r.status == AidingStatus::kAccepted)
+      wheel_doubt_.wheels((1.0 + core_->state().wheel_scale) * r.innovation[0]);
+    note(r, p.id);
   }
+}
+
+/// A fixed carrier phase was checked against its neighbours before it was called so, and tyres do slip: where the two
+/// tell another speed, the wheels' scale is asked anew, with room for what they have told wrong meanwhile, (M.45).
+void GnssIns::ask_wheels(const Pending& velocity, const AidingRecord& r) {
+  const NavState& x = core_->state();
+  const Eigen::Vector3d along = x.q_enu_imu * x.R_imu_vehicle().col(0);
+  const double speed = along.dot(x.velocity), noise = config_.vehicle.wheel_noise;
+  const auto doubt = wheel_doubt_.receiver(
+      {velocity.t_us, speed, along.dot(Eigen::Map<const Eigen::Vector3d>(r.innovation.data())),
+       along.dot(velocity.cov * along), noise * noise, core_->last_covariance()(kWheelScale, kWheelScale)},
+      config_.aiding.gate_sigma);
+  if (!doubt) return;
+  const double wrong = doubt->share * doubt->way;  // m, in whatever direction it was driven
+  const Eigen::Vector3d too_fast = doubt->share * speed * along;
+  ErrorMatrix P = core_->covariance();
+  P(kWheelScale, kWheelScale) += doubt->share * doubt->share;
+  P.block<3, 3>(kVel, kVel) += too_fast * too_fast.transpose();
+  P.diagonal().segment<2>(kPos).array() += wrong * wrong;
+  core_->replace_covariance(P);
 }
 
 bool GnssIns::agrees_with(AidingSource source, int64_t t_us) const {

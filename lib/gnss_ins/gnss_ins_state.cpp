@@ -44,6 +44,7 @@ void GnssIns::serialise(Archive& a) {
   for (PositionQuality& quality : position_quality_) quality.serialise(a);
   velocity_noise_.serialise(a);
   jump_.serialise(a);
+  wheel_doubt_.serialise(a);
   monitor_.serialise(a);
   screen_.serialise(a);
   ring_.serialise(a);

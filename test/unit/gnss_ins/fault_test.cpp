@@ -16,10 +16,11 @@ struct Worst {
   bool valid_at_end = false;
 };
 
-Worst drive_with(const char* fault, double duration_s, uint64_t seed) {
+Worst drive_with(const char* fault, double duration_s, uint64_t seed, const char* second = nullptr) {
   ScenarioConfig s = scenario("city_loop");
   s.duration_s = duration_s;
-  if (fault != nullptr) s.faults.push_back(parse_fault(fault));
+  for (const char* f : {fault, second})
+    if (f != nullptr) s.faults.push_back(parse_fault(f));
   const SimulatedDrive drive = simulate(s, seed);
   s.faults.clear();
   GnssIns filter(test::filter_config(s));
@@ -78,6 +79,20 @@ TEST_CASE("a receiver that is dragged off at half a metre a second is held again
   const Worst followed = drive_with("gnss.ramp@80+100:east_mps=0.5", 180.0, 2);
   CHECK(followed.resets >= 1);
   CHECK(followed.horizontal > 10.0);
+}
+
+TEST_CASE("wheels that slip by less than their gate do not lead away from fixed fixes") {
+  for (const double ratio : {0.005, 0.01, 0.02, 0.03}) {
+    char fault[64];
+    (void)std::snprintf(fault, sizeof fault, "wheels.slip@40+50:ratio=%g", ratio);
+    const Worst w = drive_with(fault, 120.0, 1);
+    CAPTURE(ratio, w.horizontal, w.beyond, w.last);
+    CHECK(w.horizontal < 0.2);
+    CHECK(w.last < 0.05);
+    CHECK(w.resets == 0);
+  }
+  // Teeth, and what cannot be told: whose position drifts from the wheels, and has no velocity, may be dragged off.
+  CHECK(drive_with("wheels.slip@40+50:ratio=0.02", 120.0, 1, "gnss.no_velocity@0+120").horizontal > 1.0);
 }
 
 TEST_CASE("a receiver that claims 3 mm and scatters by centimetres is not locked out") {

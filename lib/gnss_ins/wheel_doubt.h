@@ -1,0 +1,98 @@
+/// Do the wheels tell the speed that the receiver tells? A tyre that slips by a few hundredths, uphill or on snow, is
+/// too little for the gate of one speed, and ten a second outweigh the fixes that would show it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "samples/samples.h"
+
+namespace roadfix {
+
+class WheelDoubt {
+ public:
+  /// m/s by which the wheels, at their estimated scale, are faster than the filter.
+  void wheels(double excess) {
+    excess_ += excess;
+    ++count_;
+  }
+
+  /// The receiver's velocity, along the vehicle.
+  struct Speed {
+    int64_t t_us = 0;
+    double value = 0.0;           ///< m/s, as the filter has it
+    double excess = 0.0;          ///< m/s by which the receiver is faster than that
+    double variance = 0.0;        ///< m2/s2
+    double wheel_variance = 0.0;  ///< m2/s2, of one wheel speed
+    double scale_variance = 0.0;  ///< of the wheels' scale
+  };
+  struct Doubt {
+    double share = 0.0;  ///< by which the wheels have read too little; less than zero: too much
+    double way = 0.0;    ///< m, on which they did so
+  };
+  /// Nothing while chance, at this many sigmas, explains what they differ by, (M.45).
+  std::optional<Doubt> receiver(const Speed& s, double sigmas) {
+    const double dt = seconds_between(last_us_, s.t_us);
+    last_us_ = s.t_us;
+    const int count = count_;
+    const double wheels = count > 0 ? excess_ / count : 0.0;
+    excess_ = 0.0;
+    count_ = 0;
+    if (count == 0 || dt > kLongest || std::abs(s.value) < kLeastSpeed) return std::nullopt;
+    const double weight = s.value / (s.variance + s.wheel_variance / count);
+    told_[0].information += s.value * weight;
+    told_[0].sum += (s.excess - wheels) * weight;
+    told_[0].way += std::abs(s.value) * dt;
+    time_ += dt;
+    if (time_ < kSpan) return std::nullopt;
+    const std::optional<Doubt> doubt = most_likely(s.scale_variance, sigmas);
+    if (doubt) told_ = {};
+    std::copy_backward(told_.begin(), told_.end() - 1, told_.end());
+    told_[0] = {};
+    time_ = 0.0;
+    return doubt;
+  }
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    a(excess_, count_, last_us_, time_);
+    for (Told& t : told_) a(t.information, t.sum, t.way);
+  }
+
+ private:
+  static constexpr double kSpan = 1.0;        // s, of one comparison
+  static constexpr double kLongest = 1.5;     // s, between two velocities
+  static constexpr double kLeastSpeed = 2.0;  // m/s
+
+  /// What one comparison tells of the share.
+  struct Told {
+    double information = 0.0;
+    double sum = 0.0;  // share times information
+    double way = 0.0;  // m
+  };
+
+  /// Over the last one, two, ... comparisons: since when the wheels tell wrong is not known.
+  [[nodiscard]] std::optional<Doubt> most_likely(double scale_variance, double sigmas) const {
+    Told all;
+    for (const Told& t : told_) {
+      all.information += t.information;
+      all.sum += t.sum;
+      all.way += t.way;
+      if (!(all.information > 0.0)) break;
+      const double share = all.sum / all.information;
+      if (share * share > sigmas * sigmas * (1.0 / all.information + scale_variance)) return Doubt{share, all.way};
+    }
+    return std::nullopt;
+  }
+
+  double excess_ = 0.0;
+  int count_ = 0;
+  int64_t last_us_ = 0;
+  double time_ = 0.0;
+  std::array<Told, 30> told_{};  // newest first
+};
+
+}  // namespace roadfix
