@@ -30,7 +30,7 @@ void BM_ReplayDispatch(benchmark::State& state) {
   const test::TemporaryFolder folder;
   test::write_drive(folder / "in.lcm", test::small_drive(static_cast<double>(state.range(0))));
   int64_t messages = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     std::vector<std::unique_ptr<Stage>> stages;
     stages.push_back(std::make_unique<IdleStage>());
     messages += replay(folder / "in.lcm", folder / "out.lcm", std::move(stages)).messages;

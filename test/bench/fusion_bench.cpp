@@ -41,7 +41,7 @@ void BM_FusionDrive(benchmark::State& state) {
   const SimulatedDrive d = drive();
   const std::vector<test::StreamEvent> all = events(d);
   int64_t steps = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     Fusion fusion({});
     for (const test::StreamEvent& e : all) {
       if (e.sample.channel == FusionChannel::kIns) fusion.set_gnss(e.sample.odometry.t_us, e.gnss);
@@ -66,7 +66,7 @@ void BM_FusionOutput(benchmark::State& state) {
       outlook.see(e.sample);
     }
   }
-  for (auto _ : state) benchmark::DoNotOptimize(outlook.poses(fusion));
+  for ([[maybe_unused]] const auto _ : state) benchmark::DoNotOptimize(outlook.poses(fusion));
   state.counters["cpu_per_output_s"] = per(static_cast<int64_t>(state.iterations()));
 }
 BENCHMARK(BM_FusionOutput)->MeasureProcessCPUTime();

@@ -71,7 +71,7 @@ void run(GnssIns& filter, const Drive& drive) {
 void BM_GnssInsDrive(benchmark::State& state) {
   const Drive drive = demo_drive();
   int64_t samples = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     GnssIns filter(drive.config);
     run(filter, drive);
     samples += static_cast<int64_t>(drive.imu.size());

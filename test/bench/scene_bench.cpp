@@ -28,7 +28,7 @@ void stereo_pair(benchmark::State& state, const char* name, int first) {
   const SensorConfig sensor;
   std::array<LightField, 2> light;
   auto next = static_cast<std::size_t>(first);
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     const std::int64_t t_us = drive.exposures[next];
     next = next + 1 < static_cast<std::size_t>(first) + 40 ? next + 1 : static_cast<std::size_t>(first);
     renderer.render(scene, view_at(drive, rig.T_vehicle_left, t_us), threads, light[0]);
@@ -52,7 +52,7 @@ void develop(benchmark::State& state, double exposure_s) {
   InlineExecutor executor;
   LightField light;
   Renderer(world, rig.camera).render(scene, view_at(drive, rig.T_vehicle_left, drive.exposures[40]), executor, light);
-  for (auto _ : state)
+  for ([[maybe_unused]] const auto _ : state)
     benchmark::DoNotOptimize(expose({}, light, {exposure_s, 1.0}, {1, 1, {}}, executor).pixels.data());
 }
 BENCHMARK_CAPTURE(develop, day, 5e-4)->Unit(benchmark::kMillisecond);
@@ -67,7 +67,7 @@ void tracks(benchmark::State& state) {
                            TrackSimulator::RightCamera{rig.camera, rig.T_vehicle_left.inverse() * rig.T_vehicle_right},
                            1);
   std::size_t next = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     const std::int64_t t_us = drive.exposures[next++ % drive.exposures.size()];
     benchmark::DoNotOptimize(simulator.observe(view_at(drive, rig.T_vehicle_left, t_us)).data());
   }
@@ -76,7 +76,7 @@ BENCHMARK(tracks)->Unit(benchmark::kMillisecond);
 
 void make_world(benchmark::State& state) {
   const SimulatedDrive drive = stereo_drive("city_loop");
-  for (auto _ : state) benchmark::DoNotOptimize(world_of(drive).faces.data());
+  for ([[maybe_unused]] const auto _ : state) benchmark::DoNotOptimize(world_of(drive).faces.data());
 }
 BENCHMARK(make_world)->Unit(benchmark::kMillisecond);
 
