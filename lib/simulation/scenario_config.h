@@ -35,6 +35,11 @@ struct MotionConfig {
   double hill_factor = 1.0;           ///< on the terrain: at 1, slopes to about 4 %
   double roll_rad_per_mps2 = 0.004;   ///< body lean by lateral acceleration (about 2.2 deg per g)
   double pitch_rad_per_mps2 = 0.002;  ///< dive and squat by longitudinal acceleration
+  /// Slip angle of the rear tyres by lateral acceleration, m l_f / (l C_r): 1573 kg, 1.1 m, 2.68 m, 160 kN/rad
+  /// (Rajamani, Vehicle Dynamics and Control, 2nd ed. 2012: the car of his examples).
+  double rear_slip_rad_per_mps2 = 0.0040;
+  /// Displacement spectrum of the road at 0.1 cycles per metre, ISO 8608: 16e-6 is the middle of class A, 64e-6 of B.
+  double road_roughness_m3 = 64e-6;
 };
 
 struct ImuConfig {
@@ -139,6 +144,8 @@ void visit(MotionConfig& c, Visitor& v) {
   v.number("hill_factor", c.hill_factor, 0.0, 3.0);
   v.number("roll_rad_per_mps2", c.roll_rad_per_mps2, 0.0, 0.05);
   v.number("pitch_rad_per_mps2", c.pitch_rad_per_mps2, 0.0, 0.05);
+  v.number("rear_slip_rad_per_mps2", c.rear_slip_rad_per_mps2, 0.0, 0.05);
+  v.number("road_roughness_m3", c.road_roughness_m3, 0.0, 0.02);
 }
 
 template <class Visitor>

@@ -7,6 +7,9 @@
 namespace roadfix {
 namespace {
 
+/// ISO 8608, class A: what motorways and first-class roads have (Mucka, Journal of Testing and Evaluation 46, 2018).
+constexpr double kGoodRoad = 16e-6;  // m3
+
 struct Scenario {
   const char* name;
   const char* summary;
@@ -92,6 +95,7 @@ const std::vector<Scenario>& scenarios() {
       {"highway", "long curves at 120 km/h",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kHighway;
+         c.motion.road_roughness_m3 = kGoodRoad;
          c.duration_s = 180.0;
          set_scene(c, {{0.0, StreetKind::kHighway}});
        }},
@@ -104,6 +108,7 @@ const std::vector<Scenario>& scenarios() {
       {"cold_start_moving", "begins at 30 m/s on a highway",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kColdStartMoving;
+         c.motion.road_roughness_m3 = kGoodRoad;
          c.duration_s = 120.0;
          set_scene(c, {{0.0, StreetKind::kHighway}});
        }},
@@ -123,6 +128,7 @@ const std::vector<Scenario>& scenarios() {
          c.motion.acceleration_mps2 = c.motion.braking_mps2 = 0.6;
          c.motion.lateral_mps2 = 0.8;
          c.motion.hill_factor = 0.0;
+         c.motion.road_roughness_m3 = kGoodRoad;
          c.gnss.rate_hz = 0.0;
          c.duration_s = 150.0;
          set_scene(c, {{0.0, StreetKind::kCorridor}});

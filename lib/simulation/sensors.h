@@ -34,6 +34,7 @@ enum class NoiseStream : std::uint64_t {
   kCameraMounting = 23,
   kScene = 24,
   kPicture = 25,
+  kRoad = 26,
 };
 
 /// `instance` tells sources of one kind apart, below 2^56.

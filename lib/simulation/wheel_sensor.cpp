@@ -7,18 +7,13 @@ namespace roadfix {
 namespace {
 
 /// Ground speeds of the four wheels along their own rolling directions (front left, front right, rear left, rear
-/// right): the rear axle's centre does not slip sideways, the front wheels are steered to where they go.
-std::array<double, 4> rolling_speeds(double speed, double yaw_rate, const WheelsConfig& c) {
+/// right): the rear ones along the car, the front ones steered to where they go.
+std::array<double, 4> rolling_speeds(const Eigen::Vector3d& velocity, double yaw_rate, const WheelsConfig& c) {
+  const double speed = velocity.x();
   const double half = 0.5 * c.track_width_m * yaw_rate;
-  const double across = c.wheelbase_m * yaw_rate;
+  const double across = velocity.y() + c.wheelbase_m * yaw_rate;
   const auto front = [&](double along) { return std::copysign(std::hypot(along, across), along); };
   return {front(speed - half), front(speed + half), speed - half, speed + half};
-}
-
-/// Signed speed over the ground of the vehicle's origin.
-double ground_speed(const Kinematics& k) {
-  const Eigen::Vector3d forward = k.T_enu_vehicle.q * Eigen::Vector3d::UnitX();
-  return std::copysign(k.velocity_enu.norm(), forward.dot(k.velocity_enu));
 }
 
 /// True speeds with what faults do to the wheels themselves.
@@ -55,12 +50,13 @@ WheelErrorSource draw_errors(SimulatedDrive& drive) {
 WheelSample measure(const SimulatedDrive& drive, std::int64_t t_us, FaultSet& faults, WheelErrorSource& source) {
   const WheelsConfig& c = drive.config.wheels;
   const Kinematics k = drive.motion->at(seconds_between(0, t_us));
-  const double speed = ground_speed(k);
+  const Eigen::Vector3d velocity = k.T_enu_vehicle.q.conjugate() * k.velocity_enu;  // of the rear axle, vehicle axes
+  const double speed = velocity.x();
   WheelSample sample;
   sample.t_us = drive.config.start_utime + t_us;
   sample.num_speeds = c.layout == WheelLayout::kFourSpeeds ? 4 : 1;
   sample.speeds[0] = speed;
-  if (sample.num_speeds == 4) sample.speeds = rolling_speeds(speed, k.angular_rate.z(), c);
+  if (sample.num_speeds == 4) sample.speeds = rolling_speeds(velocity, k.angular_rate.z(), c);
   double noise_factor = 1.0;
   bool is_unsigned = c.signs == WheelSigns::kUnsigned;
   disturb(faults, seconds_between(0, t_us), sample, noise_factor, is_unsigned);

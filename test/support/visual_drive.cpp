@@ -59,7 +59,8 @@ VisualDrive make_drive(const VisualDriveConfig& config, uint64_t seed) {
   plan.seed = seed;
   const auto duration_us = static_cast<int64_t>(1e6 * config.scenario.duration_s);
   for (int64_t t = 0; t <= duration_us; t += 20'000) {
-    const Eigen::Vector3d p = drive.kinematics_at(config.scenario.start_utime + t).T_enu_vehicle.p;
+    Eigen::Vector3d p = drive.kinematics_at(config.scenario.start_utime + t).T_enu_vehicle.p;
+    p.z() = terrain_at(p.head<2>(), config.scenario.motion.hill_factor).height;  // the car heaves, its street does not
     if (plan.driven.empty() || (p - plan.driven.back()).norm() > 0.5) plan.driven.push_back(p);
   }
   if (plan.driven.size() < 2) plan.driven.push_back(plan.driven.front() + Eigen::Vector3d(1.0, 0.0, 0.0));

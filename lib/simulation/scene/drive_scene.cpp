@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "geometry/frames.h"
+#include "simulation/scenarios.h"
 #include "simulation/sensors.h"
 
 namespace roadfix {
@@ -24,8 +25,10 @@ StreetPlan plan_of(const SimulatedDrive& drive) {
   for (int i = 0; i <= steps; ++i) {
     const double t_s = i * kStep_s;
     const Kinematics k = drive.motion->at(t_s);
-    if (!plan.driven.empty()) driven_m += (k.T_enu_vehicle.p - plan.driven.back()).norm();
-    plan.driven.push_back(k.T_enu_vehicle.p);
+    Eigen::Vector3d p = k.T_enu_vehicle.p;
+    p.z() = terrain_at(p.head<2>(), drive.config.motion.hill_factor).height;  // the car heaves, its street does not
+    if (!plan.driven.empty()) driven_m += (p - plan.driven.back()).norm();
+    plan.driven.push_back(p);
     while (next < scene.segments.size() && scene.segments[next].begin_s <= t_s) {
       const double begin_m = plan.segments.empty() ? 0.0 : std::max(driven_m, plan.segments.back().begin_m + 1.0);
       plan.segments.push_back({begin_m, scene.segments[next++].kind});

@@ -270,7 +270,7 @@ TEST_CASE("wheel speeds follow from speed and yaw rate by the vehicle's geometry
 TEST_CASE("the magnetometer's heading is the vehicle's, turned by the declination") {
   ScenarioConfig config = scenario("city_loop");
   config.motion.hill_factor = 0.0;
-  config.motion.roll_rad_per_mps2 = config.motion.pitch_rad_per_mps2 = 0.0;
+  config.motion.roll_rad_per_mps2 = config.motion.pitch_rad_per_mps2 = config.motion.road_roughness_m3 = 0.0;
   config.mag.noise_ut = config.mag.hard_iron_std_ut = config.mag.soft_iron_std = 0.0;
   config.mag.declination_deg = 10.0;
   const SimulatedDrive drive = simulate(config, 11);
