@@ -24,11 +24,10 @@ Measurement<3> gnss_velocity(const NavState& x, const BodyMotion& motion, const 
 Measurement<1> vehicle_yaw(const NavState& x, double yaw, double sigma);
 
 /// Forward speed of the vehicle (m/s, signed) by its wheels.
-Measurement<1> wheel_speed(const NavState& x, const BodyMotion& motion, double speed, double sigma, double ahead,
-                           const Eigen::Vector3d& p_imu_vehicle);
+Measurement<1> wheel_speed(const NavState& x, const BodyMotion& motion, double speed, double sigma, double ahead);
 
-/// Sideways and vertical speed of the vehicle at its point without sideslip: zero. R is the caller's.
-Measurement<2> no_sideslip(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& p_imu_vehicle);
+/// Sideways and vertical speed of the vehicle at its rear axle: zero. R is the caller's.
+Measurement<2> no_sideslip(const NavState& x, const BodyMotion& motion);
 
 /// What the linear H of the vehicle's velocity leaves out while heading and velocity are uncertain: mean and variance
 /// of its second-order terms, per vehicle axis, under the errors' covariance P, (M.44).

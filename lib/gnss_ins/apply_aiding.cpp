@@ -114,7 +114,7 @@ AidingRecord AidingApplier::wheels(InsCore& core, const Pending& p, const Gates&
   const NavState& x = core.state();
   const double sigma = std::sqrt(p.cov(0, 0));
   double speed = p.value.x();
-  Measurement<1> m = wheel_speed(x, core.motion(), speed, sigma, p.ahead(x), config_.vehicle.p_imu_vehicle);
+  Measurement<1> m = wheel_speed(x, core.motion(), speed, sigma, p.ahead(x));
   if (p.direction == WheelDirection::kReverse) speed = -std::abs(speed);
   if (p.direction == WheelDirection::kForward) speed = std::abs(speed);
   if (p.direction == WheelDirection::kUnknown) {
@@ -140,7 +140,7 @@ AidingRecord AidingApplier::heave(InsCore& core, const Gates& gates, Beside besi
 AidingRecord AidingApplier::hold_track(InsCore& core, int axis, SideslipNoise& noise, double gate,
                                        Beside beside) const {
   const NavState& x = core.state();
-  const Measurement<2> both = no_sideslip(x, core.motion(), config_.vehicle.p_imu_vehicle);
+  const Measurement<2> both = no_sideslip(x, core.motion());
   // Tyres slip with the lateral acceleration, springs give with any.
   const BodyMotion& motion = core.motion();
   const double acceleration = axis == 0 ? x.velocity.norm() * motion.rate.z() : motion.acceleration.head<2>().norm();

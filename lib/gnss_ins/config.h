@@ -28,7 +28,8 @@ struct GnssInsVehicle {
   Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();          ///< multiplies what is left
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw of imu against vehicle
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();          ///< m, imu axes
-  Eigen::Vector3d p_imu_vehicle = Eigen::Vector3d::Zero();          ///< m, where wheels measure, imu axes
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();             ///< m, where wheels measure, imu axes
+  Eigen::Vector3d p_imu_axle_std = {1.0, 0.5, 0.5};                 ///< m, about as far as an IMU may be from there
 };
 
 /// Latencies and clock offset show only as differences, so one clock must define time: the better one by calibration,
@@ -53,7 +54,6 @@ struct AidingConfig {
   double sideslip_interval = 0.2;   ///< s between two uses: its errors are correlated
   double heave_interval = 1.0;      ///< s, likewise, for the vertical axis
   double wheel_interval = 0.1;      ///< s
-  double no_slip_x_std = 1.0;       ///< m
   double zero_velocity_std = 0.02;  ///< m/s
   double zero_rate_std = 2.0e-3;    ///< rad/s
   double zero_interval = 0.5;       ///< s
@@ -144,7 +144,6 @@ void visit(AidingConfig& c, Visitor& v) {
   v.number("sideslip_interval_s", c.sideslip_interval, 0.01, 100.0);
   v.number("heave_interval_s", c.heave_interval, 0.01, 100.0);
   v.number("wheel_interval_s", c.wheel_interval, 0.0, 100.0);
-  v.number("no_slip_x_std_m", c.no_slip_x_std, 0.0, 10.0);
   v.number("zero_velocity_std_mps", c.zero_velocity_std, 1e-4, 1.0);
   v.number("zero_rate_std_radps", c.zero_rate_std, 1e-6, 1.0);
   v.number("zero_interval_s", c.zero_interval, 0.1, 10.0);

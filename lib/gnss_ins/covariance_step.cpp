@@ -1,5 +1,6 @@
 #include "gnss_ins/covariance_step.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -101,7 +102,7 @@ template <Eigen::Index... Lane>
 class MovedColumns {
  public:
   MovedColumns(const ErrorMatrix& P, const Transition& phi) : P_(P), phi_(phi) {
-    static_assert(sizeof...(Lane) * kLanes == kStates);
+    static_assert(((row_of(Lane) + kLanes <= kStates) && ...) && sizeof...(Lane) * kLanes >= kStates);
   }
 
   void write(Moved& to) const {
@@ -116,15 +117,18 @@ class MovedColumns {
         add(sum, row, kAtt, kAccelBias);
         add(sum, row, kGyroScale, kAccelScale);
       }
-      (Eigen::internal::pstore(&to(kLanes * Lane, row), sum[Lane]), ...);
+      (Eigen::internal::pstoreu(&to(row_of(Lane), row), sum[Lane]), ...);
     }
   }
 
  private:
+  /// The last register overlaps the one before where the states do not fill it: what both hold is the same.
+  static constexpr Eigen::Index row_of(Eigen::Index lane) { return std::min(kLanes * lane, kStates - kLanes); }
+
   void add(Packet (&sum)[sizeof...(Lane)], int row, int first, int last) const {
     for (int k = first; k < last; ++k) {
       const Packet factor = Eigen::internal::pset1<Packet>(phi_.moved_by(k, row));
-      ((sum[Lane] = Eigen::internal::pmadd(factor, Eigen::internal::pload<Packet>(&P_(kLanes * Lane, k)), sum[Lane])),
+      ((sum[Lane] = Eigen::internal::pmadd(factor, Eigen::internal::ploadu<Packet>(&P_(row_of(Lane), k)), sum[Lane])),
        ...);
     }
   }
@@ -140,7 +144,7 @@ void write_moved(const ErrorMatrix& P, const Transition& phi, Moved& to, std::in
 
 Moved moved_columns(const ErrorMatrix& P, const Transition& phi) {
   Moved moved;
-  write_moved(P, phi, moved, std::make_integer_sequence<Eigen::Index, kStates / kLanes>());
+  write_moved(P, phi, moved, std::make_integer_sequence<Eigen::Index, (kStates + kLanes - 1) / kLanes>());
   return moved;
 }
 

@@ -46,7 +46,7 @@ ErrorVector start_sigmas(const GnssInsConfig& c, double yaw_std) {
   std(kPositionLatency) = time.position_latency;
   std(kVelocityLatency) = time.velocity_latency;
   std(kImuOffset) = time.imu_offset;
-  std(kNoSlipX) = c.aiding.no_slip_x_std;
+  std.segment<3>(kAxle) = v.p_imu_axle_std;
   return std;
 }
 
@@ -79,6 +79,7 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   x.t_us = s.t_us;
   x.q_enu_imu = attitude(s.mean_accel, yaw);
   x.velocity = s.velocity;
+  x.p_imu_axle = config_.vehicle.p_imu_axle;
   x.position = s.antenna - x.q_enu_imu * config_.vehicle.p_imu_antenna;
   cores_.emplace_back(config_, anchor);
   log_weights_.push_back(weight);

@@ -10,7 +10,23 @@ namespace {
 // Of the spread that the calibration gives: what may be new at each start (assumed; temperature, load, tyre pressure).
 constexpr double kTurnOnChange = 0.3;
 
-int state_of(int kept) { return kept < InsMemory::kKept - 1 ? InsMemory::kFirst + kept : kNoSlipX; }
+int state_of(int kept) {
+  constexpr int kAxleKept = InsMemory::kKept - 3;
+  return kept < kAxleKept ? InsMemory::kFirst + kept : kAxle + kept - kAxleKept;
+}
+
+/// What is kept of a state, as differences from nought.
+ErrorVector parameters(const NavState& x) {
+  NavState zero = x;
+  zero.gyro_bias.setZero();
+  zero.accel_bias.setZero();
+  zero.gyro_scale.setZero();
+  zero.accel_scale.setZero();
+  zero.wheel_scale = 0.0;
+  zero.mounting.setZero();
+  zero.p_imu_axle.setZero();
+  return local(zero, x);
+}
 
 }  // namespace
 
@@ -22,25 +38,19 @@ bool InsMemory::sane() const {
 }
 
 void recall(const InsMemory& memory, NavState& x, ErrorVector& std) {
+  const ErrorVector calibrated = parameters(x);
   ErrorVector dx = ErrorVector::Zero();
   for (int i = 0; i < InsMemory::kKept; ++i) {
     const int state = state_of(i);
     const double spread = std(state);
-    dx(state) = std::clamp(memory.value(i), -5.0 * spread, 5.0 * spread);
+    dx(state) = std::clamp(memory.value(i) - calibrated(state), -5.0 * spread, 5.0 * spread);
     std(state) = std::min(spread, std::hypot(memory.sigma(i), kTurnOnChange * spread));
   }
   x = retract(x, dx);
 }
 
 InsMemory remembered(const NavState& x, const ErrorMatrix& P) {
-  NavState zero = x;
-  zero.gyro_bias.setZero();
-  zero.accel_bias.setZero();
-  zero.gyro_scale.setZero();
-  zero.accel_scale.setZero();
-  zero.wheel_scale = zero.no_slip_x = 0.0;
-  zero.mounting.setZero();
-  const ErrorVector kept = local(zero, x);
+  const ErrorVector kept = parameters(x);
   InsMemory memory;
   for (int i = 0; i < InsMemory::kKept; ++i) {
     memory.value(i) = kept(state_of(i));

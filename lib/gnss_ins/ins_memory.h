@@ -8,11 +8,11 @@
 namespace roadfix {
 
 struct InsMemory {
-  static constexpr int kFirst = kGyroBias;  ///< error states that are kept: from here to the mounting, and the last
-  static constexpr int kKept = kPositionLatency - kGyroBias + 1;
+  static constexpr int kFirst = kGyroBias;  ///< error states that are kept: from here to the mounting, and the axle
+  static constexpr int kKept = kPositionLatency - kGyroBias + 3;
   using Kept = Eigen::Matrix<double, kKept, 1>;
 
-  Kept value = Kept::Zero();  ///< biases, scales, mounting, the point without sideslip; clocks start anew
+  Kept value = Kept::Zero();  ///< biases, scales, mounting, the axle's place; clocks start anew
   Kept sigma = Kept::Zero();
   bool parked = false;  ///< it stood, its heading and place known: the rest holds unless it is moved
   Geodetic place;       ///< of the imu

@@ -20,7 +20,7 @@ NavState retract(const NavState& x, const ErrorVector& dx) {
   y.position_latency += dx(kPositionLatency);
   y.velocity_latency += dx(kVelocityLatency);
   y.imu_offset += dx(kImuOffset);
-  y.no_slip_x += dx(kNoSlipX);
+  y.p_imu_axle += dx.segment<3>(kAxle);
   return y;
 }
 
@@ -38,7 +38,7 @@ ErrorVector local(const NavState& x, const NavState& y) {
   dx(kPositionLatency) = y.position_latency - x.position_latency;
   dx(kVelocityLatency) = y.velocity_latency - x.velocity_latency;
   dx(kImuOffset) = y.imu_offset - x.imu_offset;
-  dx(kNoSlipX) = y.no_slip_x - x.no_slip_x;
+  dx.segment<3>(kAxle) = y.p_imu_axle - x.p_imu_axle;
   return dx;
 }
 

@@ -23,6 +23,8 @@ constexpr double kMicrotesla = 1e-6;
 // would claim that they are not, and the delay would pass for a scale or a mounting error.
 constexpr double kUnknownLatency = 0.05;
 
+constexpr double kTapeMeasure = 0.05;  // m, what a distance within a car is known to that somebody measured
+
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
@@ -175,6 +177,10 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     take_known(wheels->speed_scale_std, v.wheel_scale_std);
     take_known(wheels->speed_noise, v.wheel_noise);
     take_known(wheels->track_width, v.track_width);
+    if (wheels->lever_arm) {
+      v.p_imu_axle = *wheels->lever_arm;
+      v.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure));
+    }
   }
   if (const auto& mag = calibration.sensors.mag) {
     if (mag->declination_deg) v.magnetic_declination = *mag->declination_deg * kDegree;

@@ -189,8 +189,13 @@ Calibration calibration_of(const SimulatedDrive& drive) {
   }
   const WheelsConfig& wheels = config.wheels;
   if (wheels.layout != WheelLayout::kNone) {
-    c.sensors.wheels = WheelsCalibration{wheels.rate_hz, std::hypot(wheels.speed_scale_std, wheels.wheel_scale_std),
-                                         wheels.speed_noise_mps, wheels.track_width_m};
+    c.sensors.wheels = WheelsCalibration{};
+    c.sensors.wheels->rate = wheels.rate_hz;
+    c.sensors.wheels->speed_scale_std = std::hypot(wheels.speed_scale_std, wheels.wheel_scale_std);
+    c.sensors.wheels->speed_noise = wheels.speed_noise_mps;
+    c.sensors.wheels->track_width = wheels.track_width_m;
+    // Who has moved the imu has measured by how much.
+    if (!imu.position_m.isZero(0.0)) c.sensors.wheels->lever_arm = T_body_vehicle.p;
   }
   if (config.mag.rate_hz > 0.0) {
     c.sensors.mag = MagCalibration{config.mag.declination_deg, config.mag.hard_iron_ut, Eigen::Matrix3d::Identity()};

@@ -74,11 +74,11 @@ TEST_CASE("magnetic heading Jacobian") {
 }
 
 TEST_CASE("wheel speed Jacobian") {
-  check_everywhere<1>([](const NavState& x, const BodyMotion& m) { return wheel_speed(x, m, 5.0, 0.05, 0.0, kLever); });
+  check_everywhere<1>([](const NavState& x, const BodyMotion& m) { return wheel_speed(x, m, 5.0, 0.05, 0.0); });
 }
 
 TEST_CASE("no sideslip Jacobian") {
-  check_everywhere<2>([](const NavState& x, const BodyMotion& m) { return no_sideslip(x, m, kLever); });
+  check_everywhere<2>([](const NavState& x, const BodyMotion& m) { return no_sideslip(x, m); });
 }
 
 TEST_CASE("standing Jacobians") {
@@ -96,7 +96,8 @@ TEST_CASE("what the linear velocity leaves out is what drawn errors show") {
   test::RandomState random(5);
   for (int trial = 0; trial < 4; ++trial) {
     NavState x = random.state(0.3);
-    x.wheel_scale = x.no_slip_x = 0.0;
+    x.wheel_scale = 0.0;
+    x.p_imu_axle.setZero();
     x.velocity = x.q_enu_imu * (x.R_imu_vehicle() * Eigen::Vector3d(9.0, 0.0, 0.0));
     // Correlated errors of the velocity, the heading and the mounting's yaw.
     Eigen::Matrix<double, kStates, 5> root = Eigen::Matrix<double, kStates, 5>::Zero();
@@ -107,16 +108,16 @@ TEST_CASE("what the linear velocity leaves out is what drawn errors show") {
     }
     const SecondOrder bent = bent_velocity(x, root * root.transpose());
     const Eigen::Vector3d none = Eigen::Vector3d::Zero();
-    const Measurement<1> ahead = wheel_speed(x, {}, 0.0, 1.0, 0.0, none);
-    const Measurement<2> across = no_sideslip(x, {}, none);
+    const Measurement<1> ahead = wheel_speed(x, {}, 0.0, 1.0, 0.0);
+    const Measurement<2> across = no_sideslip(x, {});
     Eigen::Vector3d sum = none, squares = none;
     for (int draw = 0; draw < kDraws; ++draw) {
       ErrorVector dx = ErrorVector::Zero();
       for (int i = 0; i < 5; ++i) dx += random.number(1.0) * root.col(i);
       const NavState y = retract(x, dx);
       Eigen::Vector3d left;
-      left.x() = (ahead.residual - wheel_speed(y, {}, 0.0, 1.0, 0.0, none).residual - ahead.H * dx)(0);
-      left.tail<2>() = across.residual - no_sideslip(y, {}, none).residual - across.H * dx;
+      left.x() = (ahead.residual - wheel_speed(y, {}, 0.0, 1.0, 0.0).residual - ahead.H * dx)(0);
+      left.tail<2>() = across.residual - no_sideslip(y, {}).residual - across.H * dx;
       sum += left;
       squares += left.cwiseAbs2();
     }

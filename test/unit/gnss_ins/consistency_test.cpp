@@ -169,3 +169,40 @@ TEST_CASE("at the end of a tunnel the errors along and across the car are as lar
           c.propagation.vibration_factor = 0.3;
         }).y() > 1.4);
 }
+
+namespace {
+
+/// Ten car parks, whose turns are tight, with the IMU off the rear axle.
+test::LevelScore off_axle(const char* name, const std::function<void(GnssInsVehicle&)>& change) {
+  ScenarioConfig truth = scenario("car_park");
+  truth.imu.position_m = {0.7, -0.4, 0.8};
+  test::LevelScore score;
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    GnssInsConfig config = test::filter_config(truth);
+    change(config.vehicle);
+    GnssIns filter(config);
+    score.run(filter, simulate(truth, seed), 40.0, truth.duration_s - 1.0);
+  }
+  std::printf("IMU off the axle, %s: level error squared over variance %.2f, within 3 sigma %.4f\n", name,
+              score.squares / score.variances, score.share());
+  return score;
+}
+
+}  // namespace
+
+TEST_CASE("an IMU off the rear axle is as good as one over it, whether the calibration tells where or not") {
+  const test::LevelScore unknown = off_axle("unknown", [](GnssInsVehicle&) {});
+  const test::LevelScore told = off_axle("told", [](GnssInsVehicle& v) {
+    v.p_imu_axle = {-0.7, 0.4, -0.8};
+    v.p_imu_axle_std.setConstant(0.05);
+  });
+  for (const test::LevelScore& score : {unknown, told}) {
+    CHECK(score.share() >= 0.98);
+    CHECK(score.squares < 1.5 * score.variances);
+  }
+  // Teeth: a place along the car alone is looked for.
+  const test::LevelScore wrong =
+      off_axle("called beside it", [](GnssInsVehicle& v) { v.p_imu_axle_std << 1.0, 0.0, 0.0; });
+  CHECK(wrong.share() < 0.7);
+  CHECK(wrong.squares > 4.0 * wrong.variances);
+}

@@ -34,7 +34,7 @@ inline GnssInsConfig filter_config(const ScenarioConfig& s) {
   v.wheel_noise = s.wheels.speed_noise_mps;
   v.wheel_scale_std = std::hypot(s.wheels.speed_scale_std, s.wheels.wheel_scale_std);
   v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
-  v.p_imu_antenna = s.gnss.lever_arm_m;
+  v.p_imu_antenna = s.gnss.lever_arm_m - s.imu.position_m;
   return c;
 }
 
@@ -88,12 +88,14 @@ inline Eigen::Matrix<double, 9, 1> error_of(const GnssIns& filter, const Odometr
   const Odometry truth = drive.truth_at(estimate.t_us);
   const EnuAnchor enu(*filter.anchor());
   SE3 T;
-  T.p = enu.enu(drive.anchor.geodetic(truth.T_frame_vehicle.p));
+  const Eigen::Vector3d arm = drive.config.imu.position_m;
+  T.p = enu.enu(drive.anchor.geodetic(truth.T_frame_vehicle * arm));
   T.q = Eigen::Quaterniond(enu.R_ecef_enu().transpose() * drive.anchor.R_ecef_enu()) * truth.T_frame_vehicle.q *
         drive.errors.q_vehicle_imu;
   Eigen::Matrix<double, 9, 1> e;
   e.head<6>() = local(estimate.T_frame_vehicle, T);
-  e.tail<3>() = drive.errors.q_vehicle_imu.conjugate() * truth.velocity - estimate.velocity;
+  const Eigen::Vector3d velocity = truth.velocity + truth.angular_rate.cross(arm);
+  e.tail<3>() = drive.errors.q_vehicle_imu.conjugate() * velocity - estimate.velocity;
   return e;
 }
 

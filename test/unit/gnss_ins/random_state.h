@@ -33,7 +33,7 @@ class RandomState {
     x.position_latency = number(0.1);
     x.velocity_latency = number(0.1);
     x.imu_offset = number(0.1);
-    x.no_slip_x = number(1.0);
+    x.p_imu_axle = {number(1.0), 0.4, -0.6};
     return x;
   }
 
