@@ -113,7 +113,7 @@ TEST_CASE("a camera whose clock, turn and place are hardly known teaches no more
 }
 
 TEST_CASE("the test of hardly known cameras sees doubts that are too small") {
-  const Honesty h = start_in_turns(0.3);
+  const Honesty h = start_in_turns(0.2);  // 0.3 of it is soon mended by a rough road: it tells where the camera sits
   CHECK(h.place > 2.5);
 }
 
@@ -158,8 +158,11 @@ TEST_CASE("a camera's time offset is found on the way, up to 0.3 s") {
   CHECK(std::abs(f.offset - offset) < 0.005);
 }
 
-TEST_CASE("without the search for it 0.3 s are not found") {
-  const Found f = drive(city(0.3), [](MsckfVehicle& v) { v.time_offset_std = 0.025; });
+// A rough road's pitching tells the clock even so.
+TEST_CASE("without the search for it 0.3 s are not found on an even road") {
+  test::VisualDriveConfig even = city(0.3);
+  even.scenario.motion.road_roughness_m3 = 0.0;
+  const Found f = drive(even, [](MsckfVehicle& v) { v.time_offset_std = 0.025; });
   CHECK((!f.running || f.resets > 0 || std::abs(f.offset - 0.3) > 0.02));
 }
 
