@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "config/config.h"
+#include "geometry/euler.h"
+#include "geometry/frames.h"
 
 namespace roadfix {
 namespace {
@@ -119,6 +121,7 @@ void visit(SensorsCalibration& c, Visitor& v) {
 
 template <class Visitor>
 void visit(MountingCalibration& c, Visitor& v) {
+  v.optional_vector("angles_deg", c.angles_deg, -180.0, 180.0);
   v.optional_vector("std_deg", c.std_deg, 0.0, 180.0);
 }
 
@@ -138,6 +141,12 @@ void visit(Calibration& c, YamlWriter& v) { visit_keys(c, v); }
 
 SE3 CameraMounting::T_body_camera() const {
   return {Eigen::Quaterniond(q_wxyz[0], q_wxyz[1], q_wxyz[2], q_wxyz[3]).normalized(), p};
+}
+
+Eigen::Vector3d Calibration::forward_in_body() const {
+  if (!mounting || !mounting->angles_deg) return Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d angles = kDegree * *mounting->angles_deg;
+  return quaternion({angles.z(), angles.y(), angles.x()}).conjugate() * Eigen::Vector3d::UnitX();
 }
 
 Calibration load_calibration(const std::filesystem::path& vehicle_dir) {

@@ -102,13 +102,17 @@ struct SensorsCalibration {
 };
 
 struct MountingCalibration {
-  std::optional<Eigen::Vector3d> std_deg;  ///< roll, pitch, yaw of the IMU's axes against the vehicle's
+  std::optional<Eigen::Vector3d> angles_deg;  ///< roll, pitch, yaw of the IMU's axes in the vehicle's, geometry/euler.h
+  std::optional<Eigen::Vector3d> std_deg;     ///< roll, pitch, yaw of the IMU's axes against the vehicle's
 };
 
 struct Calibration {
   std::optional<BodyOrigin> body_origin;
   SensorsCalibration sensors;
   std::optional<MountingCalibration> mounting;
+
+  /// Where the vehicle's x axis points in body axes, as far as that is known.
+  [[nodiscard]] Eigen::Vector3d forward_in_body() const;
 };
 
 /// VEHICLE_DIR/calibration.yaml; ConfigError where it is missing or wrong.

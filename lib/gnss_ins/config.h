@@ -26,6 +26,7 @@ struct GnssInsVehicle {
   double magnetic_declination = 0.0;                                ///< rad, east positive
   Eigen::Vector3d hard_iron = Eigen::Vector3d::Zero();              ///< T, subtracted from the field first
   Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();          ///< multiplies what is left
+  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();               ///< rad, pitch and yaw: NavState
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw of imu against vehicle
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();          ///< m, imu axes
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();             ///< m, where wheels measure, imu axes

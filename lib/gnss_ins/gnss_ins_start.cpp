@@ -83,7 +83,7 @@ void GnssIns::try_start(const ImuSample& imu) {
       s.velocity.norm() * std::hypot(config_.vehicle.position_latency_std, config_.vehicle.time_offset_std);
   s.antenna_cov = fix_->cov_enu + (moved * moved + 1e-4) * Eigen::Matrix3d::Identity();
   if (fix_->heading) {
-    s.yaw = 0.5 * kPi - fix_->heading->heading;
+    s.yaw = wrap_angle(0.5 * kPi - fix_->heading->heading - config_.vehicle.mounting.y());
     s.yaw_std =
         std::max(fix_->heading->sigma, config_.aiding.heading_floor * kDegree) + config_.vehicle.mounting_std.z();
   }

@@ -79,6 +79,7 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   x.t_us = s.t_us;
   x.q_enu_imu = attitude(s.mean_accel, yaw);
   x.velocity = s.velocity;
+  x.mounting = config_.vehicle.mounting;
   x.p_imu_axle = config_.vehicle.p_imu_axle;
   x.position = s.antenna - x.q_enu_imu * config_.vehicle.p_imu_antenna;
   cores_.emplace_back(config_, anchor);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "geometry/so3.h"
+#include "wheel/travel.h"
 
 namespace roadfix {
 
@@ -24,15 +25,65 @@ Eigen::Matrix<double, 3, kWheelStates> body_rate_rows(const WheelVector& x, cons
   return rows;
 }
 
+/// Specific force less the biases that are known of.
+Eigen::Vector3d unbiased(const WheelVector& x, const Eigen::Vector3d& accel) {
+  return accel - Eigen::Vector3d(x(kAccelBias), x(kAccelBias + 1), 0.0);
+}
+
+/// Acceleration in the imu's axes (M.19).
+Eigen::Vector3d acceleration(const WheelVector& x, const WheelStep& step) {
+  const double sr = std::sin(x(kRoll)), cr = std::cos(x(kRoll)), sp = std::sin(x(kPitch)), cp = std::cos(x(kPitch));
+  return unbiased(x, step.accel) - kStandardGravity * Eigen::Vector3d(-sp, cp * sr, cp * cr);
+}
+
 double speed_change(const WheelVector& x, const WheelStep& step) {
   if (step.blind_acceleration) return *step.blind_acceleration * step.dt;
-  return (step.accel.x() - x(kAccelBias) + kStandardGravity * std::sin(x(kPitch))) * step.dt;
+  return travel_direction(x(kSide), x(kClimb)).dot(acceleration(x, step)) * step.dt;
 }
+
+/// d speed_change / d x.
+Eigen::Matrix<double, 1, kWheelStates> speed_rows(const WheelVector& x, const WheelStep& step) {
+  Eigen::Matrix<double, 1, kWheelStates> rows = Eigen::Matrix<double, 1, kWheelStates>::Zero();
+  if (step.blind_acceleration) return rows;
+  const double sr = std::sin(x(kRoll)), cr = std::cos(x(kRoll)), sp = std::sin(x(kPitch)), cp = std::cos(x(kPitch));
+  const Eigen::Vector3d e = travel_direction(x(kSide), x(kClimb));
+  const Eigen::Matrix<double, 3, 2> by_angles = travel_direction_jacobian(x(kSide), x(kClimb));
+  rows(kAccelBias) = -e.x();
+  rows(kAccelBias + 1) = -e.y();
+  rows(kRoll) = -kStandardGravity * e.dot(Eigen::Vector3d(0.0, cp * cr, -cp * sr));
+  rows(kPitch) = -kStandardGravity * e.dot(Eigen::Vector3d(-cp, -sp * sr, -sp * cr));
+  rows(kSide) = by_angles.col(0).dot(acceleration(x, step));
+  rows(kClimb) = by_angles.col(1).dot(acceleration(x, step));
+  return step.dt * rows;
+}
+
+/// The direction of travel in the level frame less yaw: to the left and nose down, and their derivatives by x.
+struct LevelDirection {
+  double side = 0.0, pitch = 0.0;
+  Eigen::Matrix<double, 2, kWheelStates> rows = Eigen::Matrix<double, 2, kWheelStates>::Zero();
+
+  explicit LevelDirection(const WheelVector& x) {
+    const double sr = std::sin(x(kRoll)), cr = std::cos(x(kRoll)), sp = std::sin(x(kPitch)), cp = std::cos(x(kPitch));
+    const Eigen::Matrix3d by_pitch{{cp, 0.0, sp}, {0.0, 1.0, 0.0}, {-sp, 0.0, cp}};
+    const Eigen::Matrix3d tilted = by_pitch * Eigen::Matrix3d{{1.0, 0.0, 0.0}, {0.0, cr, -sr}, {0.0, sr, cr}};
+    const Eigen::Vector3d e = travel_direction(x(kSide), x(kClimb)), d = tilted * e;
+    side = std::atan2(d.y(), d.x());
+    pitch = -std::asin(d.z());
+    Eigen::Matrix<double, 3, kWheelStates> d_rows = Eigen::Matrix<double, 3, kWheelStates>::Zero();
+    d_rows.col(kRoll) = tilted * Eigen::Vector3d::UnitX().cross(e);
+    d_rows.col(kPitch) = Eigen::Vector3d::UnitY().cross(d);
+    d_rows.middleCols<2>(kSide) = tilted * travel_direction_jacobian(x(kSide), x(kClimb));
+    const double level2 = d.head<2>().squaredNorm();
+    rows.row(0) = (d.x() * d_rows.row(1) - d.y() * d_rows.row(0)) / level2;
+    rows.row(1) = -d_rows.row(2) / std::sqrt(level2);
+  }
+};
 
 DriveStep travel(const WheelVector& x, const WheelStep& step, double yaw_change) {
   // Paper B (10) takes the speed at the interval's beginning; the arc takes the mean.
   const double gained = step.form == StepForm::kArc ? 0.5 * speed_change(x, step) : 0.0;
-  return {x(kYaw), yaw_change, (x(kSpeed) + gained) * step.dt, x(kPitch) + x(kClimb), x(kSide)};
+  const LevelDirection direction(x);
+  return {x(kYaw), yaw_change, (x(kSpeed) + gained) * step.dt, direction.pitch, direction.side};
 }
 
 /// d (roll, pitch, yaw) change / d x.
@@ -46,19 +97,14 @@ Eigen::Matrix<double, 3, kWheelStates> angle_rows(const WheelVector& x, const Wh
 /// Position, yaw and speed after the interval by x.
 void motion_rows(const WheelVector& x, const WheelStep& step, const Eigen::Matrix<double, 1, kWheelStates>& turn,
                  WheelCovariance& F) {
-  Eigen::Matrix<double, 1, kWheelStates> gain = Eigen::Matrix<double, 1, kWheelStates>::Zero();
-  if (!step.blind_acceleration) {
-    gain(kAccelBias) = -step.dt;
-    gain(kPitch) = step.dt * kStandardGravity * std::cos(x(kPitch));
-  }
+  const Eigen::Matrix<double, 1, kWheelStates> gain = speed_rows(x, step);
   const double yaw_change = step.dt * euler_rates({x(kRoll), x(kPitch)}, body_rate(x, step.gyro)).z();
   const Eigen::Matrix<double, 3, 5> J = displacement_jacobian(travel(x, step, yaw_change), step.form);
   F.middleRows<3>(kPos) += J.col(1) * turn + (step.form == StepForm::kArc ? 0.5 * step.dt : 0.0) * J.col(2) * gain;
   F.block<3, 1>(kPos, kYaw) += J.col(0);
   F.block<3, 1>(kPos, kSpeed) += step.dt * J.col(2);
-  F.block<3, 1>(kPos, kPitch) += J.col(3);
-  F.block<3, 1>(kPos, kClimb) += J.col(3);
-  F.block<3, 1>(kPos, kSide) += J.col(4);
+  const LevelDirection direction(x);
+  F.middleRows<3>(kPos) += J.col(4) * direction.rows.row(0) + J.col(3) * direction.rows.row(1);
   F.row(kYaw) += turn;
   F.row(kSpeed) += gain;
 }
@@ -106,9 +152,10 @@ WheelCovariance transition(const WheelVector& x, const WheelStep& step) {
 }
 
 Eigen::Vector3d plumb_force(const WheelVector& x, const PlumbLine& plumb) {
-  Eigen::Vector3d force = plumb.force - Eigen::Vector3d(x(kAccelBias), x(kAccelBias + 1), 0.0);
+  const Eigen::Vector3d force = unbiased(x, plumb.force);
   if (!plumb.correct_acceleration) return force;
-  return force - wheel_acceleration(x(kSpeed), plumb.speed_rate, body_rate(x, plumb.gyro));
+  return force - wheel_acceleration(x(kSpeed), plumb.speed_rate, body_rate(x, plumb.gyro),
+                                    travel_direction(x(kSide), x(kClimb)));
 }
 
 WheelVector levelled_mean(const WheelVector& x, const PlumbLine& plumb) {
@@ -123,12 +170,13 @@ WheelCovariance levelling(const WheelVector& x, const PlumbLine& plumb) {
   Eigen::Matrix<double, 3, kWheelStates> force_rows = Eigen::Matrix<double, 3, kWheelStates>::Zero();
   force_rows.block<2, 2>(0, kAccelBias) = -Eigen::Matrix2d::Identity();
   if (plumb.correct_acceleration) {
-    // force - (rate, v wz, -v wy): by speed, and by omega's bias and scale.
-    const Eigen::Vector3d omega = body_rate(x, plumb.gyro);
-    const Eigen::Matrix<double, 3, kWheelStates> omega_rows = body_rate_rows(x, plumb.gyro);
-    force_rows.col(kSpeed) = Eigen::Vector3d(0.0, -omega.z(), omega.y());
-    force_rows.row(1) -= x(kSpeed) * omega_rows.row(2);
-    force_rows.row(2) += x(kSpeed) * omega_rows.row(1);
+    // By speed, by omega's bias and scale, and by the direction of travel.
+    const Eigen::Vector3d omega = body_rate(x, plumb.gyro), e = travel_direction(x(kSide), x(kClimb));
+    const Eigen::Matrix<double, 3, 2> by_angles = travel_direction_jacobian(x(kSide), x(kClimb));
+    force_rows.col(kSpeed) = -omega.cross(e);
+    force_rows += x(kSpeed) * skew(e) * body_rate_rows(x, plumb.gyro);
+    force_rows.middleCols<2>(kSide) -=
+        (plumb.speed_rate * Eigen::Matrix3d::Identity() + x(kSpeed) * skew(omega)) * by_angles;
   }
   WheelCovariance F = WheelCovariance::Identity();
   F.block<2, 2>(kRoll, kRoll) *= 1.0 - plumb.share;

@@ -24,10 +24,6 @@ Tilt printed_tilt(const Eigen::Vector3d& f) {
   return {std::atan2(f.x(), std::hypot(f.y(), f.z())), std::atan2(f.y(), std::hypot(f.x(), f.z()))};
 }
 
-Eigen::Vector3d wheel_acceleration(double speed, double speed_rate, const Eigen::Vector3d& omega) {
-  return {speed_rate, speed * omega.z(), -speed * omega.y()};
-}
-
 Eigen::Vector3d euler_rates(const Tilt& tilt, const Eigen::Vector3d& omega) {
   return euler_rates_by_omega(tilt) * omega;
 }

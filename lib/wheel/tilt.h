@@ -22,10 +22,6 @@ Eigen::Matrix<double, 2, 3> tilt_of_gravity_jacobian(const Eigen::Vector3d& spec
 /// Paper B (1), (2) as printed: A_x gives "roll" and A_y gives "pitch", each the angle of one axis to the horizontal.
 Tilt printed_tilt(const Eigen::Vector3d& specific_force);
 
-/// Acceleration of the rear axle's centre in vehicle axes: speed change forward, centripetal sideways and upwards
-/// (M.2).
-Eigen::Vector3d wheel_acceleration(double speed, double speed_rate, const Eigen::Vector3d& omega);
-
 /// Rates of (roll, pitch, yaw) for a body turning with omega, in vehicle axes (M.1).
 Eigen::Vector3d euler_rates(const Tilt& tilt, const Eigen::Vector3d& omega);
 

@@ -24,10 +24,14 @@ struct WheelSensors {
   double wheel_yaw_noise = 0.05;     ///< rad/s per sample, of the sides' or the car's own yaw rate
   double wheel_yaw_bias_std = 0.02;  ///< rad/s, of the same
   Eigen::Vector3d mounting_std =
-      Eigen::Vector3d::Constant(0.3 * kDegree);             ///< rad, imu against the direction of travel
-  std::optional<double> track_width;                        ///< m
-  Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();   ///< uT, subtracted from the field first
-  Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();  ///< multiplies what is left
+      Eigen::Vector3d::Constant(0.3 * kDegree);              ///< rad, imu against the direction of travel
+  double side = 0.0;                                         ///< rad, direction of travel to the left of the imu's x
+  double climb = 0.0;                                        ///< rad, the same below it
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();      ///< m, imu axes: the rear axle's centre
+  Eigen::Vector3d p_imu_axle_std = Eigen::Vector3d::Zero();  ///< m
+  std::optional<double> track_width;                         ///< m
+  Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();    ///< uT, subtracted from the field first
+  Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();   ///< multiplies what is left
 };
 
 /// Where the yaw rate comes from. kAutomatic: the gyro; without one the car's own sensor; without that the sides.

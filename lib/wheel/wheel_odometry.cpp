@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "geometry/so3.h"
+#include "wheel/travel.h"
 
 namespace roadfix {
 
@@ -21,6 +22,7 @@ constexpr double kSpeedRateNoise = 0.2;         ///< m/s2 of wheel noise that a 
 constexpr double kSameSpeed = 1e-6;             ///< m/s, of numbers that are meant to be equal
 constexpr int kChangesEnough = 20;              ///< of the speed, that tell in which steps it comes
 constexpr double kRounding = 1.0;               ///< s over which a rounding error stays
+constexpr double kTurnTime = 3.0;               ///< s that a turn lasts, and what it makes of an unknown axle's place
 constexpr double kBiasBlock = 1.0;              ///< s of standing gyro mean per bias update
 constexpr double kFirstBiasGate = 6.6;  ///< squared sigma, 99 %, of a standstill's first mean: beyond is turning
 constexpr double kBiasGate = 25.0;      ///< of the later ones, of which there may be hundreds
@@ -56,8 +58,8 @@ WheelInputStatus WheelOdometry::add(const ImuSample& imu) {
   if (!started_) return align(imu);
   if (imu.t_us <= t_us_) return WheelInputStatus::kOld;
   imu_us_ = imu.t_us;
-  gyro_ = imu.gyro;
   const double dt = seconds_between(t_us_, imu.t_us);
+  const Eigen::Vector3d gyro_before = std::exchange(gyro_, imu.gyro);
   if (dt > config_.tuning.imu_timeout) {
     step_blind(imu.t_us, 0.0);
     return WheelInputStatus::kUsed;
@@ -68,12 +70,16 @@ WheelInputStatus WheelOdometry::add(const ImuSample& imu) {
   next.dt = dt;
   next.gyro = imu.gyro;
   if (!gyro_yaw_) next.gyro.z() = wheel_yaw_rate_.value_or(0.0);
-  next.accel = imu.accel;
+  const WheelSensors& s = config_.sensors;
+  const Eigen::Vector3d omega = imu.gyro - state_.x.segment<3>(kGyroBias);
+  next.accel = imu.accel + lever_acceleration(s.p_imu_axle, omega, (imu.gyro - gyro_before) / dt);
+  WheelNoise noise = imu_noise();
+  noise.accel = std::hypot(noise.accel, std::sqrt(kTurnTime) * omega.squaredNorm() * s.p_imu_axle_std.x());
   next.standing = standing_.standing;
   next.turning = turns_standing_;
   next.form = config_.tuning.step_form;
   const double speed = state_.x(kSpeed);
-  step(imu.t_us, next, imu_noise());
+  step(imu.t_us, next, noise);
   forward_acceleration_ = next.standing ? 0.0 : (state_.x(kSpeed) - speed) / dt;
   const StandingLimits limits{config_.tuning.standing_speed, config_.tuning.standing_rate,
                               config_.tuning.standing_after};
@@ -103,7 +109,8 @@ void WheelOdometry::align_by_plumb(double speed_rate) {
   if (plumb_time_ > 0.0 && plumb_time_ < config_.tuning.wheel_timeout) {
     align_force_ += plumb_force_;
     if (config_.tuning.correct_acceleration)
-      align_force_ -= plumb_time_ * wheel_acceleration(last_speed_, speed_rate, plumb_gyro_ / plumb_time_);
+      align_force_ -= plumb_time_ * wheel_acceleration(last_speed_, speed_rate, plumb_gyro_ / plumb_time_,
+                                                       travel_direction(config_.sensors.side, config_.sensors.climb));
     align_time_ += plumb_time_;
   }
   forget_plumb();
@@ -139,13 +146,26 @@ void WheelOdometry::level_by_wheels(std::optional<int64_t> last_us, int64_t t_us
   }
   plumb_begin_us_ = t_us;
   plumb_begin_speed_ = last_speed_;
+  plumb_begin_gyro_ = gyro_;
+}
+
+/// Acceleration of the axle less the imu's, by the place of the axle: what the turning of the interval makes of it.
+Eigen::Matrix3d WheelOdometry::lever_by_turning() const {
+  if (!plumb_begin_us_) return Eigen::Matrix3d::Zero();
+  const Eigen::Vector3d omega = plumb_gyro_ / plumb_time_ - state_.x.segment<3>(kGyroBias);
+  const Eigen::Vector3d omega_rate = (gyro_ - plumb_begin_gyro_) / plumb_time_;
+  Eigen::Matrix3d by_place;
+  for (int i = 0; i < 3; ++i) by_place.col(i) = lever_acceleration(Eigen::Vector3d::Unit(i), omega, omega_rate);
+  return by_place;
 }
 
 void WheelOdometry::level_by_plumb(double speed_rate) {
   const WheelTuning& t = config_.tuning;
   if (plumb_time_ > 0.0 && !slip_since_us_) {
     PlumbLine plumb;
-    plumb.force = plumb_force_ / plumb_time_;
+    // The force that the axle feels, as far as it is known where it is.
+    const Eigen::Matrix3d by_place = lever_by_turning();
+    plumb.force = plumb_force_ / plumb_time_ + by_place * config_.sensors.p_imu_axle;
     plumb.gyro = plumb_gyro_ / plumb_time_;
     plumb.speed_rate = standing_.standing ? 0.0 : speed_rate;
     plumb.correct_acceleration = t.correct_acceleration;
@@ -154,7 +174,8 @@ void WheelOdometry::level_by_plumb(double speed_rate) {
     const double white = imu_noise().accel / std::sqrt(plumb_time_);
     const double wheels = wheel_noise() * std::sqrt(2.0 / (plumb_time_ * t.tilt_time_constant));
     const double off_g = std::abs(plumb_force(state_.x, plumb).norm() - kStandardGravity);
-    if (!plumb.correct_acceleration || off_g < t.tilt_gate) level(state_, plumb, std::hypot(white, wheels));
+    if (!plumb.correct_acceleration || off_g < t.tilt_gate)
+      level(state_, plumb, std::hypot(white, wheels, (by_place * config_.sensors.p_imu_axle_std.asDiagonal()).norm()));
   }
   forget_plumb();
 }
@@ -177,6 +198,8 @@ void WheelOdometry::start(const Tilt& tilt, double tilt_sigma) {
     state_.x(kGyroBias + i) = known_.gyro_bias(i);
   }
   for (int i = 0; i < 2; ++i) decouple(P, kAccelBias + i, s.accel_bias_std);
+  state_.x(kSide) = s.side;
+  state_.x(kClimb) = s.climb;
   decouple(P, kWheelScale, s.wheel_scale_std);
   decouple(P, kSide, s.mounting_std.z());
   decouple(P, kClimb, s.mounting_std.y());

@@ -93,6 +93,7 @@ class WheelOdometry {
   [[nodiscard]] double rounding_noise(double dt_s) const;
   void level_by_wheels(std::optional<int64_t> last_us, int64_t t_us, bool slipping);
   void level_by_plumb(double speed_rate);
+  [[nodiscard]] Eigen::Matrix3d lever_by_turning() const;
   void forget_plumb();
   [[nodiscard]] WheelNoise imu_noise() const;
   void use_yaw_source(bool gyro);
@@ -133,13 +134,14 @@ class WheelOdometry {
   double plumb_time_ = 0.0;                                ///< s
   std::optional<int64_t> plumb_begin_us_;                  ///< of the wheel sample since which
   double plumb_begin_speed_ = 0.0;                         ///< m/s, signed, of that sample
-  Eigen::Vector3d align_force_ = Eigen::Vector3d::Zero();  ///< m/s, corrected force integrated
-  double align_time_ = 0.0;                                ///< s
-  Eigen::Vector3d block_gyro_ = Eigen::Vector3d::Zero();   ///< rad, while standing
-  double block_time_ = 0.0;                                ///< s
-  std::optional<int64_t> mag_us_;                          ///< of the last heading used
-  double mag_strength_ = 0.0;                              ///< T, at the first
-  double mag_dip_ = 0.0;                                   ///< rad
+  Eigen::Vector3d plumb_begin_gyro_ = Eigen::Vector3d::Zero();  ///< rad/s, raw, there
+  Eigen::Vector3d align_force_ = Eigen::Vector3d::Zero();       ///< m/s, corrected force integrated
+  double align_time_ = 0.0;                                     ///< s
+  Eigen::Vector3d block_gyro_ = Eigen::Vector3d::Zero();        ///< rad, while standing
+  double block_time_ = 0.0;                                     ///< s
+  std::optional<int64_t> mag_us_;                               ///< of the last heading used
+  double mag_strength_ = 0.0;                                   ///< T, at the first
+  double mag_dip_ = 0.0;                                        ///< rad
   int reset_counter_ = 0;
 };
 

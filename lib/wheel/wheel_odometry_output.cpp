@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "geometry/euler.h"
+#include "geometry/so3.h"
+#include "wheel/travel.h"
 #include "wheel/wheel_odometry.h"
 
 namespace roadfix {
@@ -24,27 +26,42 @@ Odometry WheelOdometry::odometry() const {
   if (!started_) return out;
   const WheelVector& x = state_.x;
   const WheelCovariance& P = state_.P;
-  out.T_frame_vehicle.p = x.segment<3>(kPos);
+  // The axle has gone by kPos since the start, the imu also by what the turn since then has made of its place (M.29).
+  const WheelSensors& s = config_.sensors;
+  const Eigen::Matrix3d tilted = quaternion({0.0, x(kPitch), x(kRoll)}).toRotationMatrix();
+  const Eigen::Matrix3d turned = quaternion({x(kYaw), 0.0, 0.0}).toRotationMatrix();
+  const Eigen::Matrix3d by_place = (Eigen::Matrix3d::Identity() - turned) * tilted;
+  out.T_frame_vehicle.p = x.segment<3>(kPos) + by_place * s.p_imu_axle;
   out.T_frame_vehicle.q = quaternion({x(kYaw), x(kPitch), x(kRoll)});
-  out.velocity = Eigen::Vector3d(x(kSpeed), 0.0, 0.0);
   if (!standing_.standing) {
     out.angular_rate = gyro_;
     if (!gyro_yaw_) out.angular_rate.z() = wheel_yaw_rate_.value_or(0.0);
     out.angular_rate -= x.segment<3>(kGyroBias);
   }
+  const Eigen::Vector3d e = travel_direction(x(kSide), x(kClimb));
+  out.velocity = x(kSpeed) * e + s.p_imu_axle.cross(out.angular_rate);
 
   Eigen::Matrix<double, 6, kWheelStates> J = Eigen::Matrix<double, 6, kWheelStates>::Zero();
   J.block<3, 3>(0, kPos).setIdentity();
+  J.block<3, 1>(0, kYaw) = -Eigen::Vector3d::UnitZ().cross(turned * tilted * s.p_imu_axle);
   const Eigen::Matrix3d by_angles = rotation_by_angles(state_.tilt());
   J.block<3, 1>(3, kRoll) = by_angles.col(0);
   J.block<3, 1>(3, kPitch) = by_angles.col(1);
   J.block<3, 1>(3, kYaw) = by_angles.col(2);
   out.cov_pose = J * P * J.transpose();
+  const auto with_place = [&](const Eigen::Matrix3d& by) -> Eigen::Matrix3d {
+    const Eigen::Matrix3d root = by * s.p_imu_axle_std.asDiagonal();
+    return root * root.transpose();
+  };
+  out.cov_pose.topLeftCorner<3, 3>() += with_place(by_place);
 
   const double v = x(kSpeed), t = config_.tuning.align_time;
   const double side = config_.tuning.side_noise, climb = config_.tuning.climb_noise;
-  out.cov_velocity.diagonal() << P(kSpeed, kSpeed), v * v * (P(kSide, kSide) + side * side / t) + P(kSpeed, kSpeed),
-      v * v * (P(kClimb, kClimb) + climb * climb / t) + P(kSpeed, kSpeed);
+  const Eigen::Matrix<double, 3, 2> by_direction = v * travel_direction_jacobian(x(kSide), x(kClimb));
+  const Eigen::Vector2d angles(P(kSide, kSide) + side * side / t, P(kClimb, kClimb) + climb * climb / t);
+  out.cov_velocity =
+      P(kSpeed, kSpeed) * Eigen::Matrix3d::Identity() + by_direction * angles.asDiagonal() * by_direction.transpose();
+  out.cov_velocity += with_place(skew(out.angular_rate));
   out.validity = report().validity;
   return out;
 }
@@ -110,7 +127,8 @@ void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
   visit(self.standing_.quiet_since_us, self.standing_.slow_gyro, self.standing_.quiet_gyro, self.standing_.standing,
         self.turns_standing_, self.bias_judged_);
   visit(self.direction_.sign, self.direction_.assumed, self.direction_.undecided_since_us);
-  visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_, self.plumb_begin_us_, self.plumb_begin_speed_);
+  visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_, self.plumb_begin_us_, self.plumb_begin_speed_,
+        self.plumb_begin_gyro_);
   visit(self.align_force_, self.align_time_, self.block_gyro_, self.block_time_);
   visit(self.mag_us_, self.mag_strength_, self.mag_dip_, self.reset_counter_);
   visit(self.recalled_, self.known_.gyro_bias, self.known_.gyro_bias_sigma);

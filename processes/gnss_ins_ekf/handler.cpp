@@ -10,6 +10,7 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 #include "gnss_ins/gnss_ins.h"
 #include "gnss_ins_ekf/messages.h"
 #include "stream/state_bytes.h"
@@ -23,7 +24,7 @@ constexpr double kMicrotesla = 1e-6;
 // would claim that they are not, and the delay would pass for a scale or a mounting error.
 constexpr double kUnknownLatency = 0.05;
 
-constexpr double kTapeMeasure = 0.05;  // m, what a distance within a car is known to that somebody measured
+constexpr double kTapeMeasure_m = 0.05;  // what a distance within a car is known to that somebody measured
 
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
@@ -179,7 +180,7 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     take_known(wheels->track_width, v.track_width);
     if (wheels->lever_arm) {
       v.p_imu_axle = *wheels->lever_arm;
-      v.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure));
+      v.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure_m));
     }
   }
   if (const auto& mag = calibration.sensors.mag) {
@@ -187,6 +188,9 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;
     take_known(mag->soft_iron, v.soft_iron);
   }
+  // The shortest turn from the imu's x axis to the vehicle's: roll does not show.
+  const Eigen::Vector3d forward = calibration.forward_in_body();
+  v.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward)).tail<2>();
   if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
   return v;
 }

@@ -18,6 +18,10 @@
 namespace roadfix {
 namespace {
 
+// Standard deviations of the rear axle's place from the imu: where nothing is said, and where somebody has measured it.
+const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);
+constexpr double kTapeMeasure_m = 0.05;
+
 enum Input { kImu = 0, kWheels = 1, kMag = 2, kStart = 3 };
 using Sample = std::variant<ImuSample, WheelSample, MagSample>;
 
@@ -61,7 +65,7 @@ class WheelOdometryStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_WHEEL_ODOMETRY", "state_t", 0, 0}};
-    spec_.state_layout = 3;
+    spec_.state_layout = 4;
     spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_WHEEL", "pose_t"}};
   }
@@ -167,6 +171,7 @@ void take_walk(const std::optional<double>& sigma, const std::optional<double>& 
 
 WheelSensors wheel_sensors(const Calibration& calibration) {
   WheelSensors s;
+  if (calibration.body_origin != BodyOrigin::kRearAxle) s.p_imu_axle_std = kUnknownAxle_m;
   if (const auto& imu = calibration.sensors.imu) {
     take_known(imu->gyro_noise, s.gyro_noise);
     take_known(imu->accel_noise, s.accel_noise);
@@ -180,11 +185,16 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
     take_known(wheels->speed_scale_std, s.wheel_scale_std);
     take_known(wheels->speed_noise, s.wheel_noise);
     s.track_width = wheels->track_width;
+    if (wheels->lever_arm) s.p_imu_axle = *wheels->lever_arm;
+    if (wheels->lever_arm) s.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure_m));
   }
   if (const auto& mag = calibration.sensors.mag) {
     take_known(mag->hard_iron, s.hard_iron_ut);
     take_known(mag->soft_iron, s.soft_iron);
   }
+  const Eigen::Vector3d forward = calibration.forward_in_body();
+  s.side = std::atan2(forward.y(), forward.x());
+  s.climb = std::asin(-forward.z());
   if (calibration.mounting && calibration.mounting->std_deg) s.mounting_std = kDegree * *calibration.mounting->std_deg;
   return s;
 }

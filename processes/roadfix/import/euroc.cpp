@@ -194,7 +194,7 @@ Drive read_euroc(const fs::path& folder) {
   drive.description.origin = "EuRoC MAV recording";
   Calibration& calibration = drive.description.calibration;
   calibration.body_origin = BodyOrigin::kImu;
-  calibration.mounting = MountingCalibration{Eigen::Vector3d::Constant(180.0)};
+  calibration.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d::Constant(180.0)};
   drive.imu = read_imu(mav / "imu0" / "data.csv");
   calibration.sensors.imu = imu_calibration(read_sensor_yaml(mav / "imu0" / "sensor.yaml"));
   if (fs::exists(mav / "cam0", ignored)) {

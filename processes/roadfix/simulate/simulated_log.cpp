@@ -169,7 +169,7 @@ Calibration calibration_of(const SimulatedDrive& drive) {
   const SE3 T_body_vehicle = T_vehicle_body(drive).inverse();
   Calibration c;
   c.body_origin = BodyOrigin::kImu;
-  c.mounting = MountingCalibration{Eigen::Vector3d(imu.mounting_std_rad / kDegree)};
+  c.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d(imu.mounting_std_rad / kDegree)};
   c.sensors.imu = ImuCalibration{
       imu.rate_hz,
       imu.gyro_noise_radps_per_rthz,

@@ -28,7 +28,7 @@ sensors:
     stamp_jitter_s: 0.05
     T_body_camera: {p_m: [0.5, 0.1, 1.2], q_wxyz: [0.5, -0.5, 0.5, -0.5], std_m: 1.0, std_deg: 15}
   stereo: {scale_std: 0.002, focal_std: 0.001}
-mounting: {std_deg: [5, 4, 3]}
+mounting: {angles_deg: [1, 2, -30], std_deg: [5, 4, 3]}
 )";
 
 TEST_CASE("a full calibration is read and written without loss") {
@@ -46,6 +46,8 @@ TEST_CASE("a full calibration is read and written without loss") {
   CHECK(c.sensors.stereo->scale_std == 0.002);
   CHECK(c.sensors.stereo->focal_std == 0.001);
   CHECK(c.mounting->std_deg->z() == 3.0);
+  // Turned to the right by 30 degrees, the imu sees the car go to its left.
+  CHECK(c.forward_in_body().y() > 0.45);
   const std::string text = calibration_text(c);
   CHECK(calibration_text(parse_calibration(text, "again")) == text);
 }

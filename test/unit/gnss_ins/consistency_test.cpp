@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "filter_run.h"
+#include "geometry/so3.h"
 #include "statistics/consistency.h"
 
 using namespace roadfix;
@@ -205,4 +206,27 @@ TEST_CASE("an IMU off the rear axle is as good as one over it, whether the calib
       off_axle("called beside it", [](GnssInsVehicle& v) { v.p_imu_axle_std << 1.0, 0.0, 0.0; });
   CHECK(wrong.share() < 0.7);
   CHECK(wrong.squares > 4.0 * wrong.variances);
+}
+
+TEST_CASE("a mounting that the calibration tells is as good as none") {
+  ScenarioConfig truth = scenario("city_loop");
+  truth.imu.mounting_std_rad.setConstant(0.05);
+  test::LevelScore told, untold;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const SimulatedDrive drive = simulate(truth, seed);
+    GnssInsConfig config = test::filter_config(truth);
+    config.vehicle.mounting_std.setZero();
+    config.vehicle.p_imu_antenna = drive.errors.q_vehicle_imu.conjugate() * truth.gnss.lever_arm_m;
+    GnssIns plain(config);
+    untold.run(plain, drive, 40.0, 120.0);
+    const Eigen::Vector3d forward = drive.errors.q_vehicle_imu.conjugate() * Eigen::Vector3d::UnitX();
+    config.vehicle.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward)).tail<2>();
+    GnssIns filter(config);
+    told.run(filter, drive, 40.0, 120.0);
+  }
+  std::printf("askew: level error squared over variance %.2f told, %.2f not\n", told.squares / told.variances,
+              untold.squares / untold.variances);
+  CHECK(told.share() >= 0.98);
+  CHECK(told.squares < 1.3 * told.variances);
+  CHECK(untold.squares > 4.0 * untold.variances);  // teeth
 }

@@ -41,14 +41,18 @@ void run(const SimulatedDrive& drive, WheelOdometry& odometry, const OnPose& on_
   feed_until(INT64_MAX);
 }
 
+SE3 LevelTruth::T_enu_body(int64_t t_us) const {
+  return drive_.truth_at(t_us).T_frame_vehicle * SE3{drive_.errors.q_vehicle_imu, drive_.config.imu.position_m};
+}
+
 void LevelTruth::start(int64_t t_us) {
-  SE3 T_enu_level = drive_.truth_at(t_us).T_frame_vehicle;
+  SE3 T_enu_level = T_enu_body(t_us);
   T_enu_level.q = quaternion({yaw_of(T_enu_level.q), 0.0, 0.0});
   T_level_enu_ = T_enu_level.inverse();
 }
 
 Vector6d LevelTruth::error(const Odometry& estimate) const {
-  return local(estimate.T_frame_vehicle, *T_level_enu_ * drive_.truth_at(estimate.t_us).T_frame_vehicle);
+  return local(estimate.T_frame_vehicle, *T_level_enu_ * T_enu_body(estimate.t_us));
 }
 
 EndError end_error(const SimulatedDrive& drive, const WheelConfig& config) {
@@ -62,8 +66,10 @@ EndError end_error(const SimulatedDrive& drive, const WheelConfig& config) {
   EndError result;
   result.error = truth.error(last);
   result.cov = last.cov_pose;
-  result.speed_error = drive.truth_at(last.t_us).velocity.x() - last.velocity.x();
-  result.speed_sigma = std::sqrt(last.cov_velocity(0, 0));
+  const Odometry at_end = drive.truth_at(last.t_us);
+  const Eigen::Vector3d velocity = at_end.velocity + at_end.angular_rate.cross(drive.config.imu.position_m);
+  result.velocity_error = drive.errors.q_vehicle_imu.conjugate() * velocity - last.velocity;
+  result.cov_velocity = last.cov_velocity;
   return result;
 }
 

@@ -29,6 +29,8 @@ class LevelTruth {
   [[nodiscard]] Vector6d error(const Odometry& estimate) const;
 
  private:
+  [[nodiscard]] SE3 T_enu_body(int64_t t_us) const;
+
   const SimulatedDrive& drive_;
   std::optional<SE3> T_level_enu_;
 };
@@ -37,8 +39,8 @@ class LevelTruth {
 struct EndError {
   Vector6d error = Vector6d::Zero();
   Matrix6d cov = Matrix6d::Zero();
-  double speed_error = 0.0;
-  double speed_sigma = 0.0;
+  Eigen::Vector3d velocity_error = Eigen::Vector3d::Zero();  ///< m/s, imu axes
+  Eigen::Matrix3d cov_velocity = Eigen::Matrix3d::Zero();
 };
 EndError end_error(const SimulatedDrive& drive, const WheelConfig& config);
 

@@ -7,6 +7,7 @@
 #include "geometry/frames.h"
 #include "geometry/so3.h"
 #include "support/numerical_jacobian.h"
+#include "wheel/travel.h"
 
 namespace roadfix {
 namespace {
@@ -55,9 +56,11 @@ TEST_CASE("the wheels' acceleration is that of a body on a curve") {
   };
   const double h = 1e-3;
   const Eigen::Vector3d numerical = (position(h) - 2.0 * position(0.0) + position(-h)) / (h * h);
-  const Eigen::Vector3d predicted = wheel_acceleration(speed, speed_rate, {0.0, 0.0, curvature * speed});
+  const Eigen::Vector3d predicted =
+      wheel_acceleration(speed, speed_rate, {0.0, 0.0, curvature * speed}, Eigen::Vector3d::UnitX());
   CHECK((numerical - predicted).norm() < 1e-3);
-  CHECK((numerical - wheel_acceleration(speed, speed_rate, {0.0, 0.0, -curvature * speed})).norm() > 1.0);
+  CHECK((numerical - wheel_acceleration(speed, speed_rate, {0.0, 0.0, -curvature * speed}, Eigen::Vector3d::UnitX()))
+            .norm() > 1.0);
 }
 
 TEST_CASE("Euler rates are those of the rotation") {
@@ -97,7 +100,8 @@ double pitch_while_braking(bool corrected, double rate_hz) {
   double largest = 0.0;
   const Eigen::Vector3d f(-2.0, 0.0, kGravity);
   for (int i = 0; i < static_cast<int>(30.0 * rate_hz); ++i) {
-    const Eigen::Vector3d felt = corrected ? Eigen::Vector3d(f - wheel_acceleration(10.0, -2.0, {0.0, 0.0, 0.0})) : f;
+    const Eigen::Vector3d felt =
+        corrected ? Eigen::Vector3d(f - wheel_acceleration(10.0, -2.0, {0.0, 0.0, 0.0}, Eigen::Vector3d::UnitX())) : f;
     tilt = blend(tilt, tilt_of_gravity(felt), accelerometer_share(1.0 / rate_hz, 3.0));
     largest = std::max(largest, std::abs(tilt.pitch));
   }

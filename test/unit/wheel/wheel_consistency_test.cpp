@@ -1,6 +1,7 @@
 /// Honest covariance over 50 simulated drives, with siblings that must fail.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 
 #include "drive.h"
 #include "simulation/scenarios.h"
@@ -19,13 +20,18 @@ struct Nees {
   double median_sigma = 0.0;  ///< m
 };
 
-Nees nees(const ScenarioConfig& simulated, const WheelConfig& config) {
+/// `tell` what is known of each drive.
+using Tell = std::function<void(const SimulatedDrive&, WheelSensors&)>;
+
+Nees nees(const ScenarioConfig& simulated, WheelConfig config, const Tell& tell = {}) {
   ConsistencyAccumulator pose, speed;
   std::vector<double> errors, sigmas;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const test::EndError end = test::end_error(simulate(simulated, seed), config);
+    const SimulatedDrive drive = simulate(simulated, seed);
+    if (tell) tell(drive, config.sensors);
+    const test::EndError end = test::end_error(drive, config);
     pose.add(normalised_square(end.error, end.cov).value(), 6);
-    speed.add(std::pow(end.speed_error / end.speed_sigma, 2), 1);
+    speed.add(end.velocity_error.x() * end.velocity_error.x() / end.cov_velocity(0, 0), 1);
     errors.push_back(end.error.head<2>().norm());
     sigmas.push_back(std::sqrt(end.cov(0, 0) + end.cov(1, 1)));
   }
@@ -57,6 +63,40 @@ TEST_CASE("also with noise that the filter was not told: times 1.5") {
   louder.imu.accel_noise_mps2_per_rthz *= 1.5;
   louder.wheels.speed_noise_mps *= 1.5;
   CHECK(chi_square_band(kSeeds, 6).holds(nees(louder, test::matching_config(city())).pose));
+}
+
+ScenarioConfig askew() {
+  ScenarioConfig s = city();
+  s.imu.mounting_std_rad.setConstant(0.05);
+  s.imu.position_m = {0.7, -0.4, 0.8};
+  return s;
+}
+
+TEST_CASE("an IMU askew and off the axle, as the calibration tells, is as good as one in its place") {
+  const auto tell = [](const SimulatedDrive& drive, WheelSensors& s) {
+    const Eigen::Quaterniond q_imu_vehicle = drive.errors.q_vehicle_imu.conjugate();
+    const Eigen::Vector3d forward = q_imu_vehicle * Eigen::Vector3d::UnitX();
+    s.side = std::atan2(forward.y(), forward.x());
+    s.climb = std::asin(-forward.z());
+    s.p_imu_axle = -(q_imu_vehicle * drive.config.imu.position_m);
+  };
+  const Nees n = nees(askew(), test::matching_config(city()), tell);
+  CHECK(chi_square_band(kSeeds, 6).holds(n.pose));
+  CHECK(n.median_error < 6.5);
+  // Teeth: in its place is what it is not.
+  CHECK(nees(askew(), test::matching_config(city())).pose > 100.0);
+}
+
+TEST_CASE("an IMU askew and off the axle is honest where the calibration tells how far it may be") {
+  WheelConfig config = test::matching_config(askew());
+  config.sensors.p_imu_axle_std = {1.0, 0.5, 0.5};
+  const double pose = nees(askew(), config).pose;
+  CHECK(pose < chi_square_band(kSeeds, 6).high);
+  CHECK(pose > 0.7);
+  // Teeth: a third of how far.
+  config.sensors.mounting_std *= 0.3;
+  config.sensors.p_imu_axle_std *= 0.3;
+  CHECK(nees(askew(), config).pose > chi_square_band(kSeeds, 6).high);
 }
 
 TEST_CASE("teeth: an overconfident scale fails") {
