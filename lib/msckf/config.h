@@ -44,6 +44,7 @@ struct MsckfWindow {
   double sigma_px = 1.0;          ///< of a track's image coordinate
   double focal_std = 0.01;        ///< relative, of one eye's focal length; two eyes: theirs is taken as it is
   double radial_std = 0.02;       ///< coefficient of r^2 left over, of one eye
+  double radial4_std = 0.05;      ///< coefficient of r^4: at the border of a picture (r^2 = 2/3) as much as that of r^2
   double gate = 0.99;             ///< probability below which a point's residual is taken for noise
   int min_sightings = 3;          ///< of a finished track
   double nearest = 0.5;           ///< m, of points from a camera
@@ -105,6 +106,7 @@ void visit(MsckfWindow& c, Visitor& v) {
   v.number("sigma_px", c.sigma_px, 0.05, 10.0);
   v.number("focal_std", c.focal_std, 0.0, 0.2);
   v.number("radial_std", c.radial_std, 0.0, 0.5);
+  v.number("radial4_std", c.radial4_std, 0.0, 0.5);
   v.number("gate", c.gate, 0.5, 0.9999999);
   v.integer("min_sightings", c.min_sightings, 2, 16);
   v.number("nearest_m", c.nearest, 0.01, 100.0);

@@ -75,7 +75,7 @@ Linear PointUpdate::sighting_of(const State& state, const Landmark& landmark, co
   Linear linear(stereo ? 4 : 2);
   linear.block(kCameraTurn, by_left * J.camera_turn);
   linear.block(kCameraPlace, by_left * J.camera_place);
-  Eigen::Matrix<double, Eigen::Dynamic, 2, 0, 4, 2> lens = Eigen::MatrixX2d::Zero(stereo ? 4 : 2, 2);
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 4, 3> lens = Eigen::MatrixX3d::Zero(stereo ? 4 : 2, 3);
   lens.topRows<2>() = weight * by_lens(state.camera, h);
   linear.block(kLens, lens);
   if (anchor.id != clone.id) {

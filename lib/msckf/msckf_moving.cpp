@@ -132,7 +132,7 @@ Eigen::Matrix<double, kBaseSize, 1> Msckf::expected_errors(const MovingStart& pl
   d.segment<3>(kAccelBias) = plan.at.accel_bias - x.accel_bias;
   d.segment<3>(kCameraTurn) = log_q(c.T_imu_camera.q.conjugate() * known.T_imu_camera.q);
   d.segment<3>(kCameraPlace) = known.T_imu_camera.p - c.T_imu_camera.p;
-  d.segment<2>(kLens) = known.lens - c.lens;
+  d.segment<3>(kLens) = known.lens - c.lens;
   d(kTimeOffset) = known.time_offset - c.time_offset;
   d(kWheelScale) = known.wheel_scale - c.wheel_scale;
   d.segment<2>(kMounting) = known.mounting - c.mounting;

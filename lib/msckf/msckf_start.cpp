@@ -71,6 +71,7 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   if (!c.T_left_right) {
     set(kLens, 1, config_.window.focal_std);
     set(kLens + 1, 1, config_.window.radial_std);
+    set(kLens + 2, 1, config_.window.radial4_std);
   }
   set(kTimeOffset, 1, clock_.sigma());
   set(kWheelScale, 1, c.wheel_scale_std);

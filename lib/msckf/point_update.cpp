@@ -71,7 +71,7 @@ int PointUpdate::linearise(const State& state, const Track& track, const Clone& 
     const RelativeView left = left_view(state.camera, anchor, clone);
     const DirectionJacobian J = direction_jacobian(state.camera, anchor, clone, left, f);
     add(left, Eigen::Matrix3d::Identity(), J, clone, s.point.left, s.point.px);
-    work_.block<2, 2>(row - 2, 9) = s.point.px / window_.sigma_px * by_lens(state.camera, left.direction(f));
+    work_.block<2, 3>(row - 2, 9) = s.point.px / window_.sigma_px * by_lens(state.camera, left.direction(f));
     if (T_left_right_ && s.point.right)
       add(right_view(left, *T_left_right_), T_left_right_->R().transpose(), J, clone, *s.point.right, s.point.px);
   }

@@ -74,20 +74,21 @@ Eigen::Vector2d straightened(const Calibrated& camera, const Eigen::Vector2d& se
   const Eigen::Vector2d u = seen / std::exp(camera.lens.x());
   double radial = 1.0;
   for (int round = 0; round < kLensRounds; ++round) {
-    const double r2 = u.squaredNorm() / (radial * radial);
-    radial = 1.0 + camera.lens.y() * r2 / (1.0 + r2);
+    const double r2 = u.squaredNorm() / (radial * radial), share = r2 / (1.0 + r2);
+    radial = 1.0 + share * (camera.lens.y() + share * camera.lens.z());
   }
   return u / radial;
 }
 
-Eigen::Matrix2d by_lens(const Calibrated& camera, const Eigen::Vector3d& h) {
+Matrix2x3 by_lens(const Calibrated& camera, const Eigen::Vector3d& h) {
   const Eigen::Vector2d n = h.head<2>() / h.z();
   const double r2 = n.squaredNorm(), share = r2 / (1.0 + r2);
-  const double radial = 1.0 + camera.lens.y() * share;
+  const double radial = 1.0 + share * (camera.lens.y() + share * camera.lens.z());
+  const double by_share = camera.lens.y() + 2.0 * share * camera.lens.z();
   Eigen::Matrix2d by_point = radial * Eigen::Matrix2d::Identity();
-  by_point += 2.0 * camera.lens.y() / ((1.0 + r2) * (1.0 + r2)) * n * n.transpose();
-  Eigen::Matrix2d by_error;
-  by_error << radial * n, share * n;
+  by_point += 2.0 * by_share / ((1.0 + r2) * (1.0 + r2)) * n * n.transpose();
+  Matrix2x3 by_error;
+  by_error << radial * n, share * n, share * share * n;
   return by_point.inverse() * by_error;
 }
 

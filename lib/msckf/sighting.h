@@ -42,7 +42,7 @@ Eigen::Vector2d straightened(const Calibrated& camera, const Eigen::Vector2d& se
 
 /// By how much less that is for each error of the lens, at the point that is expected: taken at the point seen it would
 /// have that point's noise, as the residual has, and squares of it add up.
-Eigen::Matrix2d by_lens(const Calibrated& camera, const Eigen::Vector3d& h);
+Matrix2x3 by_lens(const Calibrated& camera, const Eigen::Vector3d& h);
 
 /// d (h.xy / h.z) / d h.
 Matrix2x3 projection_jacobian(const Eigen::Vector3d& h);

@@ -65,7 +65,7 @@ void State::retract(const Eigen::VectorXd& d) {
   imu.accel_scale += part(kAccelScale);
   camera.T_imu_camera.q = (camera.T_imu_camera.q * exp_q(part(kCameraTurn))).normalized();
   camera.T_imu_camera.p += part(kCameraPlace);
-  camera.lens += d.segment<2>(kLens);
+  camera.lens += d.segment<3>(kLens);
   camera.time_offset += d(kTimeOffset);
   camera.wheel_scale += d(kWheelScale);
   camera.mounting += d.segment<2>(kMounting);

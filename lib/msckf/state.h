@@ -32,11 +32,11 @@ enum Block : int {
   kImuSize = 21,
   kCameraTurn = 21,   ///< of the camera in the imu, camera axes
   kCameraPlace = 24,  ///< imu axes
-  kLens = 27,  ///< of the left camera: logarithm of true over calibrated focal length; radial distortion left over
-  kTimeOffset = 29,
-  kWheelScale = 30,
-  kMounting = 31,  ///< pitch and yaw of the vehicle in the imu
-  kBaseSize = 33
+  kLens = 27,         ///< of the left camera, three numbers of (M.48)
+  kTimeOffset = 30,
+  kWheelScale = 31,
+  kMounting = 32,  ///< pitch and yaw of the vehicle in the imu
+  kBaseSize = 34
 };
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxLandmarks;
 
@@ -61,7 +61,7 @@ struct ImuState {
 
 struct Calibrated {
   SE3 T_imu_camera;
-  Eigen::Vector2d lens = Eigen::Vector2d::Zero();  ///< c_f and c_r of (M.48)
+  Eigen::Vector3d lens = Eigen::Vector3d::Zero();  ///< c_f, c_r and c_q of (M.48)
   double time_offset = 0.0;  ///< s: a picture stamped t was taken at t + time_offset on the imu's clock
   double wheel_scale = 0.0;  ///< measured / true - 1
   Eigen::Vector2d mounting = Eigen::Vector2d::Zero();  ///< R_imu_vehicle = Exp(0, pitch, yaw)

@@ -69,7 +69,7 @@ class Columns {
   struct Block {
     int at = 0, width = 0;  ///< in the state
   };
-  static constexpr int kCamera = 8;  ///< turn, place, lens
+  static constexpr int kCamera = 9;  ///< turn, place, lens
   static constexpr int kMost = kCamera + 6 * kMaxClones;
 
   explicit Columns(const State& state);
