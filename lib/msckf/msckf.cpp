@@ -16,7 +16,6 @@ constexpr double kMaxOffset_s = 0.3;         // of the camera's clock, that is w
 constexpr size_t kMaxWaiting = 1024;         // pictures, wheel samples
 constexpr double kMemory_s = 6.0;            // of imu samples before a start
 constexpr double kKept_s = 1.0;              // while running: a restart's pose is half a second old
-constexpr double kLineRest = 0.1;            // of the jitter that is left on the line
 constexpr double kShareMemory = 0.9;
 constexpr double kStillFor_s = 0.25;   // least that a picture has stood still when it is called so (Standing)
 constexpr double kUnseenWay = 0.02;    // m, standard deviation: a pixel of flow, seen from 10 m through 500 px
@@ -223,9 +222,7 @@ void Msckf::use_picture(const SeenFrame& frame) {
   clone_us_ = state_.imu.t_us;
   const ImuSample& now = *std::lower_bound(imu_.begin(), imu_.end() - 1, state_.imu.t_us,
                                            [](const ImuSample& s, int64_t t) { return s.t_us < t; });
-  const double jitter =
-      config_.vehicle.camera_rate > 0.0 ? kLineRest * config_.vehicle.stamp_jitter : config_.vehicle.stamp_jitter;
-  state_.add_clone(id, state_.imu.rate(now.gyro), jitter);
+  state_.add_clone(id, state_.imu.rate(now.gyro), stamps_.jitter());
   points_.clear_counts();
   if (!points_.use_landmarks(state_, frame)) return lose("the filter broke");
   tracks_.add(frame, id);

@@ -120,11 +120,10 @@ void Msckf::serialise(Archive& a) {
       s.scale);
     calibrated(a, s.at.camera);
   });
-  int64_t stamp_us = stamps_.last_us();
   a(phase_, scale_, reason_, stands_, reset_counter_, reset_delta_.q.coeffs(), reset_delta_.p, last_pose_.q.coeffs(),
-    last_pose_.p, stamp_us, next_clone_, clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_,
+    last_pose_.p, next_clone_, clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_,
     stands_since_us_, zero_us_, begun_gyro_bias_, used_us_, doubtful_us_, used_share_, num_seen_);
-  stamps_.set_last(stamp_us);
+  stamps_.serialise(a);
 }
 
 std::vector<uint8_t> Msckf::save() const {
