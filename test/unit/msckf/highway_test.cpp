@@ -13,8 +13,8 @@ constexpr int kEvery = 1000;  // samples of the imu, ten seconds
 constexpr double kSigmas = 3.0;
 /// Of the values on the way: 0.003 where white, but one excursion counts for half a minute.
 constexpr double kMostOutside = 0.02;
-constexpr double kMostDrift = 0.01;  // of the way
-constexpr double kFirstWay = 500.0;  // m, before which a share says little
+constexpr double kMostDrift = 0.01;   // of the way
+constexpr double kFirstWay = 1000.0;  // m, before which a share says little: the start alone is off by metres
 
 struct Drift {
   double sigmas = 0.0;          ///< largest of an axis of the position, at the end
