@@ -90,7 +90,10 @@ Fusion::Forward Fusion::forward(const Ahead& a) const {
   if (s.scale) F.block<2, 1>(0, *s.scale) = -told_way;
   if (s.turns) F(2, *s.turns) = -way.z();
   if (s.drift) F(2, *s.drift) = -heard;
-  if (s.velocity) F.block<2, 2>(0, *s.velocity) = -heard * Eigen::Matrix2d::Identity();
+  if (s.velocity) {
+    F.block<2, 2>(0, *s.velocity) = -heard * Eigen::Matrix2d::Identity();
+    F.block<2, 1>(0, kYaw) += heard * Eigen::Vector2d(x(*s.velocity + 1), -x(*s.velocity));  // (F.11h)
+  }
   if (told && silent <= 0.0) {
     f.speed = length * a.felt->velocity.x();
     if (s.scale) F(3, *s.scale) = -f.speed;

@@ -83,7 +83,8 @@ FusionMeasurement<3> relative_motion(const Vector& x, const ChannelSlots& slots,
   const Planar predicted = predicted_motion(x, slots, dt);
   FusionMeasurement<3> m;
   m.H.middleCols<3>(kPos) = motion_by_end(clone);
-  m.H.middleCols<3>(slots.clone) = motion_by_start(clone, now);
+  // A velocity error turns with the yaw of the clone, (F.11h): what it displaces does not turn once more.
+  m.H.middleCols<3>(slots.clone) = motion_by_start(clone, slots.velocity ? Planar(x.segment<3>(kPos)) : now);
   m.H.topRows<2>() *= factor(x, slots.scale);
   m.H.row(2) *= factor(x, slots.turns);
   if (slots.scale) m.H.block<2, 1>(0, *slots.scale) = predicted.head<2>();
@@ -114,7 +115,7 @@ CarriedOn carry_on(FusionEstimate& e, const PoseBefore& start, const Planar& mot
                     start.pose.y() + way_n - dt * e.x(kInsVelocity + 1),
                     wrap_angle(wrap_angle(start.pose.z() + motion.z()) - dt * e.x(kInsDrift)));
   // next = start + way, turned by the start's yaw, less dt times what errs in each component.
-  const double by_yaw[] = {-way_n, way_e, 0.0};
+  const double by_yaw[] = {start.pose.y() - next.y(), next.x() - start.pose.x(), 0.0};  // (F.11h)
   constexpr int kErrs[] = {kInsVelocity, kInsVelocity + 1, kInsDrift};
   CarriedOn told;
   with_size(e, [&](auto length, auto columns) {

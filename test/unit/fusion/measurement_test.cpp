@@ -20,6 +20,15 @@ using test::random_estimate;
 const ChannelSlots kVision{kVoClone, kVoScale, kVoTurns, std::nullopt, std::nullopt};
 const ChannelSlots kInertial{kInsClone, std::nullopt, std::nullopt, kInsDrift, kInsVelocity};
 
+/// x + d, but a velocity error turns with the yaw of its clone, (F.11h).
+Vector turned_plus(const Vector& x, const Vector& d, const ChannelSlots& slots) {
+  Vector y = plus(x, d);
+  if (!slots.velocity) return y;
+  const int e = *slots.velocity;
+  y.segment<2>(e) = Eigen::Rotation2Dd(d(slots.clone + 2)) * x.segment<2>(e) + d.segment<2>(e);
+  return y;
+}
+
 TEST_CASE("Jacobian of the relative motion, scale, turns and drift included") {
   Draws draws(1);
   for (int i = 0; i < 21; ++i) {
@@ -28,11 +37,28 @@ TEST_CASE("Jacobian of the relative motion, scale, turns and drift included") {
     for (const ChannelSlots& slots : {kVision, kInertial}) {
       const auto h = [&](const Vector& d) {
         return Eigen::Vector3d(
-            -relative_motion(plus(x, d), slots, motion, 0.3, Eigen::Matrix3d::Identity()).innovation);
+            -relative_motion(turned_plus(x, d, slots), slots, motion, 0.3, Eigen::Matrix3d::Identity()).innovation);
       };
       const FusionMeasurement<3> m = relative_motion(x, slots, motion, 0.3, Eigen::Matrix3d::Identity());
       CHECK((m.H - test::numerical_jacobian<3, kSize>(h, 1e-5)).cwiseAbs().maxCoeff() < 1e-7);
     }
+  }
+}
+
+TEST_CASE("motion in the vehicle's axes says nothing of the yaw, whatever its velocity error is") {
+  Draws draws(12);
+  for (int i = 0; i < 20; ++i) {
+    const Vector x = random_estimate(draws).x;
+    const FusionMeasurement<3> m =
+        relative_motion(x, kInertial, draws.vector<3>(0.5), 0.3, Eigen::Matrix3d::Identity());
+    // All that stands in ENU turns about the origin.
+    Vector all = Vector::Zero();
+    for (const int at : {kPos + 0, kInsClone + 0}) all.segment<3>(at) << -x(at + 1), x(at), 1.0;
+    CHECK((m.H * all).norm() < 1e-12);
+    // An error of e in ENU axes would have e turn by itself, and be seen.
+    Vector fixed = all;
+    fixed.segment<2>(kInsVelocity) << x(kInsVelocity + 1), -x(kInsVelocity);
+    CHECK((m.H * fixed).norm() > 0.2 * x.segment<2>(kInsVelocity).norm());
   }
 }
 
@@ -243,7 +269,9 @@ TEST_CASE("Jacobian of a channel's speed, with its scale or its velocity error")
     for (const ChannelSlots& slots : {kVision, kInertial}) {
       const auto h = [&](const Vector& d) {
         Vector moved = plus(x, d);
-        moved(kYaw) = x(kYaw);  // through which a velocity error of centimetres turns nothing
+        if (slots.velocity)  // turns with the yaw, (F.11h)
+          moved.segment<2>(kInsVelocity) =
+              Eigen::Rotation2Dd(d(kYaw)) * x.segment<2>(kInsVelocity) + d.segment<2>(kInsVelocity);
         return Eigen::Matrix<double, 1, 1>(-told_speed(moved, slots, 5.0, 0.01).innovation);
       };
       const ScalarMeasurement m = told_speed(x, slots, 5.0, 0.01);
