@@ -57,8 +57,8 @@ Gates::Gates(double sigma) {
 
 AidingApplier::AidingApplier(const GnssInsConfig& config)
     : config_(config),
-      lateral_(config.sideslip, config.sideslip.prior_count),
-      vertical_(config.sideslip, config.sideslip.heave_prior_count) {}
+      lateral_(config.sideslip, config.sideslip.start_std, config.sideslip.prior_count),
+      vertical_(config.sideslip, config.sideslip.heave_start_std, config.sideslip.heave_prior_count) {}
 
 AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& gates) const {
   const GnssInsVehicle& v = config_.vehicle;

@@ -72,15 +72,16 @@ struct AidingConfig {
 
 /// The no-sideslip constraint's noise, one learner for each axis.
 struct SideslipConfig {
-  double start_std = 0.1;           ///< m/s, before anything is learnt
-  double min_std = 0.001;           ///< m/s, the least that is used
-  double max_std = 0.5;             ///< m/s
-  double start_slope = 0.03;        ///< s: m/s per m/s2 of acceleration, likewise (rear slip angle at 10 m/s)
-  double prior_count = 0.2;         ///< residuals that the start counts for
-  double heave_prior_count = 20.0;  ///< likewise, for the vertical axis
-  double memory_count = 400.0;      ///< residuals
-  double confidence = 3.0;          ///< sigmas of the learnt variance that are added to it
-  double min_speed = 2.0;           ///< m/s, to learn
+  double start_std = 0.1;          ///< m/s, before anything is learnt, across
+  double heave_start_std = 0.05;   ///< m/s, likewise, up: roads of class A to C give 0.02 to 0.08 (MODEL.md)
+  double min_std = 0.001;          ///< m/s, the least that is used
+  double max_std = 0.5;            ///< m/s
+  double start_slope = 0.03;       ///< s: m/s per m/s2 of acceleration, likewise (rear slip angle at 10 m/s)
+  double prior_count = 0.2;        ///< residuals that the start counts for
+  double heave_prior_count = 4.0;  ///< likewise, up: with `confidence` on top 0.09 m/s at the start
+  double memory_count = 400.0;     ///< residuals
+  double confidence = 3.0;         ///< sigmas of the learnt variance that are added to it
+  double min_speed = 2.0;          ///< m/s, to learn
 };
 
 /// How the filter moves between measurements.
@@ -163,6 +164,7 @@ void visit(AidingConfig& c, Visitor& v) {
 template <class Visitor>
 void visit(SideslipConfig& c, Visitor& v) {
   v.number("start_std_mps", c.start_std, 1e-3, 10.0);
+  v.number("heave_start_std_mps", c.heave_start_std, 1e-3, 10.0);
   v.number("min_std_mps", c.min_std, 1e-4, 10.0);
   v.number("max_std_mps", c.max_std, 1e-3, 10.0);
   v.number("start_slope_s", c.start_slope, 1e-3, 10.0);

@@ -30,9 +30,9 @@ double LearntVariance::careful(double confidence) const {
   return value_ * (1.0 + confidence * std::sqrt(2.0 / count_));
 }
 
-SideslipNoise::SideslipNoise(const SideslipConfig& config, double prior_count)
+SideslipNoise::SideslipNoise(const SideslipConfig& config, double start_std, double prior_count)
     : config_(config),
-      straight_(config.start_std, kLeastLearnt, prior_count),
+      straight_(start_std, kLeastLearnt, prior_count),
       slope_(config.start_slope, kLeastSlope, prior_count) {}
 
 double SideslipNoise::correlation() const { return std::clamp(product_ - persisting_, 0.0, kMostCorrelation); }

@@ -42,7 +42,8 @@ class LearntVariance {
 
 class SideslipNoise {
  public:
-  SideslipNoise(const SideslipConfig& config, double prior_count);
+  /// start_std: m/s, of a straight road before anything is learnt; it and the config's slope count for `prior_count`.
+  SideslipNoise(const SideslipConfig& config, double start_std, double prior_count);
 
   /// m/s, to use at this acceleration (m/s2: lateral, or horizontal for the vertical axis).
   [[nodiscard]] double sigma(double acceleration) const;

@@ -124,12 +124,12 @@ namespace {
 constexpr int kTunnels = 80;
 constexpr double kTunnelEnd = 149.0;  // s
 
-/// Mean of the squared errors along and across the car over their variances, at the tunnel's end.
-Eigen::Vector2d tunnel_ratios(const std::function<void(GnssInsConfig&)>& change) {
+/// Mean of the squared errors along and across the car and up over their variances, at the tunnel's end.
+Eigen::Vector3d tunnel_ratios(const std::function<void(GnssInsConfig&)>& change) {
   ScenarioConfig truth = scenario("tunnel_dark");
   truth.camera.layout = CameraLayout::kNone;
   truth.duration_s = kTunnelEnd + 0.5;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int seed = 1; seed <= kTunnels; ++seed) {
     const SimulatedDrive drive = simulate(truth, static_cast<uint64_t>(seed));
     GnssInsConfig config = test::filter_config(truth);
@@ -142,11 +142,12 @@ Eigen::Vector2d tunnel_ratios(const std::function<void(GnssInsConfig&)>& change)
       done = true;
       const Odometry o = f.output().odometry;
       const Eigen::Vector3d forward = o.T_frame_vehicle.q * Eigen::Vector3d::UnitX();
-      Eigen::Matrix2d to_car;
-      to_car << forward.x(), forward.y(), -forward.y(), forward.x();
-      to_car /= forward.head<2>().norm();
-      const Eigen::Vector2d e = to_car * test::error_of(f, o, drive).head<2>();
-      const Eigen::Matrix2d P = to_car * o.cov_pose.topLeftCorner<2, 2>() * to_car.transpose();
+      const double level = forward.head<2>().norm();
+      const double east = forward.x() / level, north = forward.y() / level;
+      Eigen::Matrix3d to_car;
+      to_car << east, north, 0.0, -north, east, 0.0, 0.0, 0.0, 1.0;
+      const Eigen::Vector3d e = to_car * test::error_of(f, o, drive).head<3>();
+      const Eigen::Matrix3d P = to_car * o.cov_pose.topLeftCorner<3, 3>() * to_car.transpose();
       sum += e.cwiseAbs2().cwiseQuotient(P.diagonal());
     });
   }
@@ -155,20 +156,25 @@ Eigen::Vector2d tunnel_ratios(const std::function<void(GnssInsConfig&)>& change)
 
 }  // namespace
 
-TEST_CASE("at the end of a tunnel the errors along and across the car are as large as is claimed") {
+TEST_CASE("at the end of a tunnel the errors along and across the car and up are as large as is claimed") {
   // Ratios over eighty drives scatter by 0.16.
-  const Eigen::Vector2d now = tunnel_ratios([](GnssInsConfig&) {});
-  std::printf("at a tunnel's end: along %.2f, across %.2f\n", now.x(), now.y());
-  CHECK(now.minCoeff() > 0.65);
+  const Eigen::Vector3d now = tunnel_ratios([](GnssInsConfig&) {});
+  std::printf("at a tunnel's end: along %.2f, across %.2f, up %.2f\n", now.x(), now.y(), now.z());
+  CHECK(now.head<2>().minCoeff() > 0.65);
   CHECK(now.maxCoeff() < 1.4);
-  // Teeth: a wheel scale that is held for exact, wheels that are held for five times as noisy as they are, and a gyro
-  // that is held for three times as quiet whatever it shows.
+  CHECK(now.z() > 0.45);
+  // Teeth: a wheel scale that is held for exact, wheels that are held for five times as noisy as they are, a gyro that
+  // is held for three times as quiet whatever it shows, and roads that are held for far rougher than any.
   CHECK(tunnel_ratios([](GnssInsConfig& c) { c.vehicle.wheel_scale_std = 0.0; }).x() > 1.4);
   CHECK(tunnel_ratios([](GnssInsConfig& c) { c.vehicle.wheel_noise *= 5.0; }).x() < 0.65);
   CHECK(tunnel_ratios([](GnssInsConfig& c) {
           c.vehicle.gyro_noise *= 0.3;
           c.propagation.vibration_factor = 0.3;
         }).y() > 1.4);
+  CHECK(tunnel_ratios([](GnssInsConfig& c) {
+          c.sideslip.heave_start_std = 0.1;
+          c.sideslip.heave_prior_count = 20.0;
+        }).z() < 0.45);
 }
 
 namespace {
