@@ -115,7 +115,8 @@ bool KeyframeTracker::pull_away(const CameraFrame& frame, const std::vector<Feat
     second.push_back(map_.lens().straighten(*now));
   }
   const Eigen::Quaterniond q_start = from.T_map_camera.q.conjugate() * predict(frame.t_us).q;
-  const Eigen::Vector3d ahead = rig_.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitX();
+  const double forward = told->travel.backwards ? -1.0 : 1.0;
+  const Eigen::Vector3d ahead = rig_.T_vehicle_left.q.conjugate() * (forward * Eigen::Vector3d::UnitX());
   const ShortWayConfig config{left_.focal(), config_.sigma_px, config_.gate_px, config_.weak_inliers, ahead};
   const double length_sigma = std::max(kMinTravelSigma, told->travel.sigma);
   auto way = short_way(first, second, told->travel.distance, length_sigma, q_start, config);

@@ -14,22 +14,24 @@ enum class SpeedSource : int8_t { kWheels = 0, kIns = 1 };
 struct SpeedSample {
   int64_t t_us = 0;
   SpeedSource source = SpeedSource::kWheels;
-  double speed = 0.0;      ///< m/s, magnitude
+  double speed = 0.0;      ///< m/s, negative backwards where it is directed, else a magnitude
   double sigma = 0.0;      ///< m/s, noise of one sample
   double scale_std = 0.0;  ///< relative, the same for all samples of the source
+  bool directed = true;
 
   template <class Self, class Archive>
   static void members(Self& self, Archive& archive) {
-    archive(self.t_us, self.source, self.speed, self.sigma, self.scale_std);
+    archive(self.t_us, self.source, self.speed, self.sigma, self.scale_std, self.directed);
   }
 };
 
 constexpr double kMinTravelSigma = 0.005;  ///< m; no speed sensor is better between two pictures
 
 struct Travel {
-  double distance = 0.0;  ///< m
+  double distance = 0.0;  ///< m, from the one place to the other
   double sigma = 0.0;     ///< m, without the scale error that all distances share
   double scale_std = 0.0;
+  bool backwards = false;
 };
 
 /// Speeds of one source. Between samples the speed runs straight; before the first and after the last it stays, and the
@@ -51,15 +53,17 @@ class TravelHistory {
  private:
   struct Mark {
     SpeedSample sample;
-    double way = 0.0;  ///< m since the first sample ever
+    double way = 0.0;   ///< m since the first sample ever, signed
+    double path = 0.0;  ///< m, likewise, to and fro
 
     template <class Self, class Archive>
     static void members(Self& self, Archive& archive) {
-      archive(self.sample, self.way);
+      archive(self.sample, self.way, self.path);
     }
   };
   [[nodiscard]] double way_at(int64_t t_us) const;
   [[nodiscard]] double doubt_at(int64_t t_us) const;
+  [[nodiscard]] double turned_back(int64_t begin_us, int64_t end_us) const;
 
   std::deque<Mark> marks_;
 };

@@ -136,7 +136,10 @@ Restart restart(const vo_restart_t& m) {
 std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels) {
   const double speed = sample.num_speeds == 4 ? 0.5 * (sample.speeds[2] + sample.speeds[3]) : sample.speeds[0];
   if (sample.num_speeds < 1 || !std::isfinite(speed)) return std::nullopt;
-  SpeedSample s{sample.t_us, SpeedSource::kWheels, std::abs(speed), kWheelNoise, kWheelScaleStd};
+  SpeedSample s{sample.t_us, SpeedSource::kWheels, speed, kWheelNoise, kWheelScaleStd};
+  s.directed = sample.direction != WheelDirection::kUnknown;
+  if (sample.direction != WheelDirection::kSigned) s.speed = std::abs(speed);
+  if (sample.direction == WheelDirection::kReverse) s.speed = -std::abs(speed);
   if (wheels) {
     s.sigma = wheels->speed_noise.value_or(kWheelNoise);
     s.scale_std = wheels->speed_scale_std.value_or(kWheelScaleStd);
@@ -150,7 +153,8 @@ std::optional<SpeedSample> ins_speed(const Odometry& o) {
   // A filter's velocity error lasts: within a keyframe or ten it is the same, like a scale's.
   const double sigma = std::sqrt(variance);
   constexpr double kSlow = 1.0;  // m/s, below which a share of the speed says nothing
-  return SpeedSample{o.t_us, SpeedSource::kIns, speed, sigma, sigma / std::max(kSlow, speed)};
+  return SpeedSample{o.t_us, SpeedSource::kIns, std::copysign(speed, o.velocity.x()), sigma,
+                     sigma / std::max(kSlow, speed)};
 }
 
 std::optional<LevelSample> ins_level(const Odometry& o) {
