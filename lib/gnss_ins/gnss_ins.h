@@ -140,6 +140,8 @@ class GnssIns {
   std::optional<GnssFix> fix_, fix_before_;  // good ones, for the start
   int64_t last_fix_us_ = 0;                  // the last one that passed, to know it when it comes again
   Geodetic last_fix_;
+  int64_t told_us_ = 0;  // the last fix with a velocity: its stamp, place and velocity
+  Eigen::Vector3d told_place_ = Eigen::Vector3d::Zero(), told_velocity_ = Eigen::Vector3d::Zero();
   std::optional<double> wheel_speed_;
   std::array<int64_t, kAidingSources> used_at_us_{};
   int64_t refused_since_us_ = 0;

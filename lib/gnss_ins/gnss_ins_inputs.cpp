@@ -46,8 +46,14 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
   p.cov = floored(fix.cov_enu, a.position_floor);
   pending_.push(p);
   if (fix.velocity && a.use_gnss_velocity) {
+    const Eigen::Vector3d place = p.value;
     p.kind = PendingKind::kVelocity;
     p.value = to_enu * fix.velocity->enu;
+    const double dt = seconds_between(told_us_, fix.t_us);
+    p.contradiction = place - told_place_ - 0.5 * dt * (told_velocity_ + p.value);
+    told_us_ = fix.t_us;
+    told_place_ = place;
+    told_velocity_ = p.value;
     const bool given = fix.velocity->cov_enu.diagonal().minCoeff() > 0.0;
     p.cov = floored(fix.velocity->cov_enu, given ? a.velocity_floor : a.velocity_default);
     pending_.push(p);

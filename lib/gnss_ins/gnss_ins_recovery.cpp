@@ -54,10 +54,11 @@ void GnssIns::ask_wheels(const Pending& velocity, const AidingRecord& r) {
   const NavState& x = core_->state();
   const Eigen::Vector3d along = x.q_enu_imu * x.R_imu_vehicle().col(0);
   const double speed = along.dot(x.velocity), noise = config_.vehicle.wheel_noise;
-  const auto doubt = wheel_doubt_.receiver(
-      {velocity.t_us, speed, along.dot(Eigen::Map<const Eigen::Vector3d>(r.innovation.data())),
-       along.dot(velocity.cov * along), noise * noise, core_->last_covariance()(kWheelScale, kWheelScale)},
-      config_.aiding.gate_sigma);
+  const auto doubt =
+      wheel_doubt_.receiver({velocity.t_us, speed, along.dot(Eigen::Map<const Eigen::Vector3d>(r.innovation.data())),
+                             along.dot(velocity.cov * along), noise * noise,
+                             core_->last_covariance()(kWheelScale, kWheelScale), along.dot(velocity.contradiction)},
+                            config_.aiding.gate_sigma);
   if (!doubt) return;
   const double wrong = doubt->share * doubt->way;  // m, in whatever direction it was driven
   const Eigen::Vector3d too_fast = doubt->share * speed * along;

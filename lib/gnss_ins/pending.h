@@ -22,6 +22,8 @@ struct Pending {
   WheelDirection direction = WheelDirection::kSigned;
   FixType fix_type = FixType::kNone;
   double alike = 1.0;  ///< as Measurement::alike, when it is used
+  /// Of a velocity: m, by which the receiver's positions have gone further since the last one than its velocities.
+  Eigen::Vector3d contradiction = Eigen::Vector3d::Zero();
 
   /// s, age of the value at its stamp less the offset of the IMU's clock: how much earlier on the IMU's clock it was.
   [[nodiscard]] double age(const NavState& x) const {
@@ -43,7 +45,7 @@ struct Pending {
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(kind, t_us, id, value, cov, direction, fix_type);
+    a(kind, t_us, id, value, cov, direction, fix_type, contradiction);
   }
 };
 

@@ -28,12 +28,15 @@ class WheelDoubt {
     double variance = 0.0;        ///< m2/s2
     double wheel_variance = 0.0;  ///< m2/s2, of one wheel speed
     double scale_variance = 0.0;  ///< of the wheels' scale
+    /// m, by which the receiver's positions have gone further along the vehicle since the last one than its velocities.
+    double contradiction = 0.0;
   };
   struct Doubt {
     double share = 0.0;  ///< by which the wheels have read too little; less than zero: too much
     double way = 0.0;    ///< m, on which they did so
   };
-  /// Nothing while chance, at this many sigmas, explains what they differ by, (M.45).
+  /// Nothing while chance, at this many sigmas, explains what they differ by, or the receiver contradicts itself, as
+  /// one that repeats itself does, (M.45).
   std::optional<Doubt> receiver(const Speed& s, double sigmas) {
     const double dt = seconds_between(last_us_, s.t_us);
     last_us_ = s.t_us;
@@ -46,10 +49,12 @@ class WheelDoubt {
     told_[0].information += s.value * weight;
     told_[0].sum += (s.excess - wheels) * weight;
     told_[0].way += std::abs(s.value) * dt;
+    told_[0].contradiction += s.contradiction;
     time_ += dt;
     if (time_ < kSpan) return std::nullopt;
-    const std::optional<Doubt> doubt = most_likely(s.scale_variance, sigmas);
-    if (doubt) told_ = {};
+    const bool slips = std::abs(told_[0].sum) < kMostSlip * told_[0].information;
+    const std::optional<Doubt> doubt = slips ? most_likely(s.scale_variance, sigmas) : std::nullopt;
+    if (doubt || !slips) told_ = {};
     std::copy_backward(told_.begin(), told_.end() - 1, told_.end());
     told_[0] = {};
     time_ = 0.0;
@@ -59,19 +64,22 @@ class WheelDoubt {
   template <class Archive>
   void serialise(Archive& a) {
     a(excess_, count_, last_us_, time_);
-    for (Told& t : told_) a(t.information, t.sum, t.way);
+    for (Told& t : told_) a(t.information, t.sum, t.way, t.contradiction);
   }
 
  private:
   static constexpr double kSpan = 1.0;        // s, of one comparison
   static constexpr double kLongest = 1.5;     // s, between two velocities
   static constexpr double kLeastSpeed = 2.0;  // m/s
+  static constexpr double kMostSlip = 0.1;    // more is for the gate of one speed, or a receiver that stands still
+  static constexpr double kFixesApart = 0.1;  // m, what RTK-fixed positions scatter by
 
   /// What one comparison tells of the share.
   struct Told {
     double information = 0.0;
-    double sum = 0.0;  // share times information
-    double way = 0.0;  // m
+    double sum = 0.0;            // share times information
+    double way = 0.0;            // m
+    double contradiction = 0.0;  // m
   };
 
   /// Over the last one, two, ... comparisons: since when the wheels tell wrong is not known.
@@ -81,8 +89,10 @@ class WheelDoubt {
       all.information += t.information;
       all.sum += t.sum;
       all.way += t.way;
+      all.contradiction += t.contradiction;
       if (!(all.information > 0.0)) break;
       const double share = all.sum / all.information;
+      if (std::abs(all.contradiction) > kFixesApart + 0.5 * std::abs(share) * all.way) continue;
       if (share * share > sigmas * sigmas * (1.0 / all.information + scale_variance)) return Doubt{share, all.way};
     }
     return std::nullopt;

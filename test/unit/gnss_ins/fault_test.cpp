@@ -95,6 +95,14 @@ TEST_CASE("wheels that slip by less than their gate do not lead away from fixed 
   CHECK(drive_with("wheels.slip@40+50:ratio=0.02", 120.0, 1, "gnss.no_velocity@0+120").horizontal > 1.0);
 }
 
+TEST_CASE("a receiver that repeats itself does not make wheels doubted") {
+  const Worst w = drive_with("gnss.stuck@60+20", 120.0, 1);
+  CAPTURE(w.horizontal, w.beyond, w.last);
+  CHECK(w.horizontal < 1.0);
+  CHECK(w.last < 0.05);
+  CHECK(w.resets == 0);
+}
+
 TEST_CASE("a receiver that claims 3 mm and scatters by centimetres is not locked out") {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const Worst w = drive_with("gnss.claim@30+120:factor=0.1", 150.0, seed);
