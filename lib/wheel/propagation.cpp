@@ -152,7 +152,7 @@ WheelCovariance transition(const WheelVector& x, const WheelStep& step) {
 }
 
 Eigen::Vector3d plumb_force(const WheelVector& x, const PlumbLine& plumb) {
-  const Eigen::Vector3d force = unbiased(x, plumb.force);
+  Eigen::Vector3d force = unbiased(x, plumb.force);
   if (!plumb.correct_acceleration) return force;
   return force - wheel_acceleration(x(kSpeed), plumb.speed_rate, body_rate(x, plumb.gyro),
                                     travel_direction(x(kSide), x(kClimb)));

@@ -63,7 +63,7 @@ VisualDrive make_drive(const VisualDriveConfig& config, uint64_t seed) {
     p.z() = terrain_at(p.head<2>(), config.scenario.motion.hill_factor).height;  // the car heaves, its street does not
     if (plan.driven.empty() || (p - plan.driven.back()).norm() > 0.5) plan.driven.push_back(p);
   }
-  if (plan.driven.size() < 2) plan.driven.push_back(plan.driven.front() + Eigen::Vector3d(1.0, 0.0, 0.0));
+  if (plan.driven.size() < 2) plan.driven.emplace_back(plan.driven.front() + Eigen::Vector3d(1.0, 0.0, 0.0));
   const World world = build_world(plan);
   const Camera camera(lens());
   std::optional<TrackSimulator::RightCamera> right;
