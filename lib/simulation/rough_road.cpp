@@ -34,7 +34,7 @@ RoughRoad::RoughRoad(double roughness_m3, double wheelbase, double track_width, 
   constexpr double kStep = std::numbers::ln2 / kWavesPerOctave;
   for (int i = 0; i < kOctaves * kWavesPerOctave; ++i) {
     const double cycles = kLongest * std::exp2((i + random.uniform()) / kWavesPerOctave);
-    const double variance = 0.5 * kPi * roughness_m3 * kReference * kReference / cycles * kStep;  // (S.4)
+    const double variance = 0.5 * kPi * roughness_m3 * kReference * kReference / cycles * kStep;  // (S.3)
     const double direction = 2.0 * kPi * random.uniform();
     const double phase = 2.0 * kPi * random.uniform();
     waves_.push_back({2.0 * kPi * cycles * Eigen::Vector2d(std::cos(direction), std::sin(direction)),

@@ -36,7 +36,7 @@ class RoughRoad {
   std::vector<Wave> waves_;
 };
 
-/// Motion of the body over that of the road below a wheel, at an angular frequency in rad/s, (S.5).
+/// Motion of the body over that of the road below a wheel, at an angular frequency in rad/s, (S.4).
 std::complex<double> body_response(double frequency);
 
 }  // namespace roadfix

@@ -44,13 +44,18 @@ Worst drive_with(const char* fault, double duration_s, uint64_t seed, const char
   return worst;
 }
 
+/// The filter was never further off than `most`, no more than `last` (m) at the end, and never gave itself up.
+void check_held(const Worst& w, double most, double last) {
+  CAPTURE(w.horizontal, w.beyond, w.last, w.resets);
+  CHECK(w.horizontal < most);
+  CHECK(w.last < last);
+  CHECK(w.resets == 0);
+}
+
 }  // namespace
 
 TEST_CASE("fixes 15 m off for half a minute are not followed") {
-  const Worst w = drive_with("gnss.bias@60+30:east_m=15", 120.0, 2);
-  CHECK(w.horizontal < 1.5);
-  CHECK(w.last < 0.2);
-  CHECK(w.resets == 0);
+  check_held(drive_with("gnss.bias@60+30:east_m=15", 120.0, 2), 1.5, 0.2);
 }
 
 TEST_CASE("a receiver that stays 15 m off is believed in the end") {
@@ -70,11 +75,7 @@ TEST_CASE("a gyro that clips in turns does not leave a lost filter that calls it
 }
 
 TEST_CASE("a receiver that is dragged off at half a metre a second is held against") {
-  const Worst w = drive_with("gnss.ramp@80+40:east_mps=0.5", 150.0, 2);
-  CAPTURE(w.horizontal, w.last, w.resets);
-  CHECK(w.horizontal < 1.5);
-  CHECK(w.last < 0.2);
-  CHECK(w.resets == 0);
+  check_held(drive_with("gnss.ramp@80+40:east_mps=0.5", 150.0, 2), 1.5, 0.2);
   // What cannot be told: a drag that lasts is believed in the end, with a reset that says so.
   const Worst followed = drive_with("gnss.ramp@80+100:east_mps=0.5", 180.0, 2);
   CHECK(followed.resets >= 1);
@@ -86,21 +87,15 @@ TEST_CASE("wheels that slip by less than their gate do not lead away from fixed 
     char fault[64];
     (void)std::snprintf(fault, sizeof fault, "wheels.slip@40+50:ratio=%g", ratio);
     const Worst w = drive_with(fault, 120.0, 1);
-    CAPTURE(ratio, w.horizontal, w.beyond, w.last);
-    CHECK(w.horizontal < 0.2);
-    CHECK(w.last < 0.05);
-    CHECK(w.resets == 0);
+    CAPTURE(ratio);
+    check_held(w, 0.2, 0.05);
   }
   // Teeth, and what cannot be told: whose position drifts from the wheels, and has no velocity, may be dragged off.
   CHECK(drive_with("wheels.slip@40+50:ratio=0.02", 120.0, 1, "gnss.no_velocity@0+120").horizontal > 1.0);
 }
 
 TEST_CASE("a receiver that repeats itself does not make wheels doubted") {
-  const Worst w = drive_with("gnss.stuck@60+20", 120.0, 1);
-  CAPTURE(w.horizontal, w.beyond, w.last);
-  CHECK(w.horizontal < 1.0);
-  CHECK(w.last < 0.05);
-  CHECK(w.resets == 0);
+  check_held(drive_with("gnss.stuck@60+20", 120.0, 1), 1.0, 0.05);
 }
 
 TEST_CASE("a receiver that claims 3 mm and scatters by centimetres is not locked out") {
