@@ -16,6 +16,9 @@ constexpr double kMaxSeconds = 10.0;     // s, of a latency or an offset
 constexpr double kMaxCorrelation = 1e6;  // s
 constexpr double kMaxPixels = 20000.0;
 
+const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);  // standard deviations: about as far as an IMU may be from there
+constexpr double kTapeMeasure_m = 0.05;               // the same of a distance within a car that somebody measured
+
 }  // namespace
 
 template <class Visitor>
@@ -147,6 +150,16 @@ Eigen::Vector3d Calibration::forward_in_body() const {
   if (!mounting || !mounting->angles_deg) return Eigen::Vector3d::UnitX();
   const Eigen::Vector3d angles = kDegree * *mounting->angles_deg;
   return quaternion({angles.z(), angles.y(), angles.x()}).conjugate() * Eigen::Vector3d::UnitX();
+}
+
+AxlePlace Calibration::rear_axle() const {
+  AxlePlace place{Eigen::Vector3d::Zero(), kUnknownAxle_m};
+  if (body_origin == BodyOrigin::kRearAxle) place.std.setZero();
+  if (sensors.wheels && sensors.wheels->lever_arm) {
+    place.p = *sensors.wheels->lever_arm;
+    place.std.setConstant(sensors.wheels->lever_arm_std.value_or(kTapeMeasure_m));
+  }
+  return place;
 }
 
 Calibration load_calibration(const std::filesystem::path& vehicle_dir) {

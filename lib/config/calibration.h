@@ -106,6 +106,12 @@ struct MountingCalibration {
   std::optional<Eigen::Vector3d> std_deg;     ///< roll, pitch, yaw of the IMU's axes against the vehicle's
 };
 
+/// The rear axle's centre, on the ground, seen from the IMU in body axes.
+struct AxlePlace {
+  Eigen::Vector3d p;    ///< m
+  Eigen::Vector3d std;  ///< m
+};
+
 struct Calibration {
   std::optional<BodyOrigin> body_origin;
   SensorsCalibration sensors;
@@ -113,6 +119,9 @@ struct Calibration {
 
   /// Where the vehicle's x axis points in body axes, as far as that is known.
   [[nodiscard]] Eigen::Vector3d forward_in_body() const;
+
+  /// Measured where wheels.lever_arm_body_m tells it; none where the body's origin is the axle; else unknown.
+  [[nodiscard]] AxlePlace rear_axle() const;
 };
 
 /// VEHICLE_DIR/calibration.yaml; ConfigError where it is missing or wrong.

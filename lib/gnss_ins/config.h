@@ -30,7 +30,7 @@ struct GnssInsVehicle {
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw of imu against vehicle
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();          ///< m, imu axes
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();             ///< m, where wheels measure, imu axes
-  Eigen::Vector3d p_imu_axle_std = {1.0, 0.5, 0.5};                 ///< m, about as far as an IMU may be from there
+  Eigen::Vector3d p_imu_axle_std = Eigen::Vector3d::Zero();         ///< m
 };
 
 /// Latencies and clock offset show only as differences, so one clock must define time: the better one by calibration,

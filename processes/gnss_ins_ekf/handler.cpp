@@ -24,8 +24,6 @@ constexpr double kMicrotesla = 1e-6;
 // would claim that they are not, and the delay would pass for a scale or a mounting error.
 constexpr double kUnknownLatency = 0.05;
 
-constexpr double kTapeMeasure_m = 0.05;  // what a distance within a car is known to that somebody measured
-
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
@@ -178,11 +176,10 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     take_known(wheels->speed_scale_std, v.wheel_scale_std);
     take_known(wheels->speed_noise, v.wheel_noise);
     take_known(wheels->track_width, v.track_width);
-    if (wheels->lever_arm) {
-      v.p_imu_axle = *wheels->lever_arm;
-      v.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure_m));
-    }
   }
+  const AxlePlace axle = calibration.rear_axle();
+  v.p_imu_axle = axle.p;
+  v.p_imu_axle_std = axle.std;
   if (const auto& mag = calibration.sensors.mag) {
     if (mag->declination_deg) v.magnetic_declination = *mag->declination_deg * kDegree;
     if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;

@@ -18,10 +18,6 @@
 namespace roadfix {
 namespace {
 
-// Standard deviations of the rear axle's place from the imu: where nothing is said, and where somebody has measured it.
-const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);
-constexpr double kTapeMeasure_m = 0.05;
-
 enum Input { kImu = 0, kWheels = 1, kMag = 2, kStart = 3 };
 using Sample = std::variant<ImuSample, WheelSample, MagSample>;
 
@@ -171,7 +167,6 @@ void take_walk(const std::optional<double>& sigma, const std::optional<double>& 
 
 WheelSensors wheel_sensors(const Calibration& calibration) {
   WheelSensors s;
-  if (calibration.body_origin != BodyOrigin::kRearAxle) s.p_imu_axle_std = kUnknownAxle_m;
   if (const auto& imu = calibration.sensors.imu) {
     take_known(imu->gyro_noise, s.gyro_noise);
     take_known(imu->accel_noise, s.accel_noise);
@@ -185,9 +180,10 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
     take_known(wheels->speed_scale_std, s.wheel_scale_std);
     take_known(wheels->speed_noise, s.wheel_noise);
     s.track_width = wheels->track_width;
-    if (wheels->lever_arm) s.p_imu_axle = *wheels->lever_arm;
-    if (wheels->lever_arm) s.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure_m));
   }
+  const AxlePlace axle = calibration.rear_axle();
+  s.p_imu_axle = axle.p;
+  s.p_imu_axle_std = axle.std;
   if (const auto& mag = calibration.sensors.mag) {
     take_known(mag->hard_iron, s.hard_iron_ut);
     take_known(mag->soft_iron, s.soft_iron);

@@ -60,6 +60,16 @@ TEST_CASE("what a calibration does not say is unknown") {
   CHECK_FALSE(c.mounting.has_value());
 }
 
+TEST_CASE("the rear axle stands where the calibration tells, with what is known of it") {
+  const auto axle = [](const std::string& text) { return parse_calibration(text, "calibration.yaml").rear_axle(); };
+  CHECK(axle("sensors: {wheels: {rate_hz: 10}}\n").std == Eigen::Vector3d(1.0, 0.5, 0.5));  // nobody knows
+  CHECK(axle("body_origin: rear_axle\nsensors: {}\n").std.isZero());
+  const AxlePlace measured = axle("sensors: {wheels: {lever_arm_body_m: [-0.7, 0.1, -0.3]}}\n");
+  CHECK(measured.p == Eigen::Vector3d(-0.7, 0.1, -0.3));
+  CHECK(measured.std == Eigen::Vector3d::Constant(0.05));
+  CHECK(axle("sensors: {wheels: {lever_arm_body_m: [1, 0, 0], lever_arm_std_m: 0.2}}\n").std.x() == 0.2);
+}
+
 TEST_CASE("a wrong calibration says what is wrong") {
   const auto error = [](const std::string& text) -> std::string {
     try {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "config/calibration.h"
 #include "gnss_ins/gnss_ins.h"
 #include "simulation/scenarios.h"
 #include "simulation/simulate.h"
@@ -35,6 +36,7 @@ inline GnssInsConfig filter_config(const ScenarioConfig& s) {
   v.wheel_scale_std = std::hypot(s.wheels.speed_scale_std, s.wheels.wheel_scale_std);
   v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
   v.p_imu_antenna = s.gnss.lever_arm_m - s.imu.position_m;
+  v.p_imu_axle_std = Calibration().rear_axle().std;
   return c;
 }
 
