@@ -16,8 +16,10 @@ constexpr double kMaxSeconds = 10.0;     // s, of a latency or an offset
 constexpr double kMaxCorrelation = 1e6;  // s
 constexpr double kMaxPixels = 20000.0;
 
-const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);  // standard deviations: about as far as an IMU may be from there
-constexpr double kTapeMeasure_m = 0.05;               // the same of a distance within a car that somebody measured
+// Standard deviations of a place seen from the IMU: about as far as it may be, and what a tape measure leaves.
+const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);
+const Eigen::Vector3d kUnknownAntenna_m(1.0, 0.5, 1.0);
+constexpr double kTapeMeasure_m = 0.05;
 
 }  // namespace
 
@@ -37,6 +39,7 @@ template <class Visitor>
 void visit(GnssCalibration& c, Visitor& v) {
   v.optional_number("rate_hz", c.rate, 0.001, kMaxRate);
   v.optional_vector("lever_arm_body_m", c.lever_arm, -kMaxLength, kMaxLength);
+  v.optional_number("lever_arm_std_m", c.lever_arm_std, 0.0, kMaxLength);
   v.optional_choice(
       "height", c.height,
       {{"ellipsoid", HeightKind::kEllipsoid}, {"msl", HeightKind::kMeanSeaLevel}, {"unknown", HeightKind::kUnknown}});
@@ -152,12 +155,21 @@ Eigen::Vector3d Calibration::forward_in_body() const {
   return quaternion({angles.z(), angles.y(), angles.x()}).conjugate() * Eigen::Vector3d::UnitX();
 }
 
-AxlePlace Calibration::rear_axle() const {
-  AxlePlace place{Eigen::Vector3d::Zero(), kUnknownAxle_m};
+PlaceOnVehicle Calibration::rear_axle() const {
+  PlaceOnVehicle place{Eigen::Vector3d::Zero(), kUnknownAxle_m};
   if (body_origin == BodyOrigin::kRearAxle) place.std.setZero();
   if (sensors.wheels && sensors.wheels->lever_arm) {
     place.p = *sensors.wheels->lever_arm;
     place.std.setConstant(sensors.wheels->lever_arm_std.value_or(kTapeMeasure_m));
+  }
+  return place;
+}
+
+PlaceOnVehicle Calibration::antenna() const {
+  PlaceOnVehicle place{Eigen::Vector3d::Zero(), kUnknownAntenna_m};
+  if (sensors.gnss && sensors.gnss->lever_arm) {
+    place.p = *sensors.gnss->lever_arm;
+    place.std.setConstant(sensors.gnss->lever_arm_std.value_or(0.0));
   }
   return place;
 }

@@ -36,6 +36,7 @@ struct ImuCalibration {
 struct GnssCalibration {
   std::optional<double> rate;                  ///< Hz
   std::optional<Eigen::Vector3d> lever_arm;    ///< m, p_body_antenna
+  std::optional<double> lever_arm_std;         ///< m, of each of its parts
   std::optional<HeightKind> height;            ///< what the receiver's height is measured from
   std::optional<double> position_latency_std;  ///< s, by which positions are older than their stamps
   std::optional<double> velocity_latency_std;  ///< s
@@ -106,8 +107,8 @@ struct MountingCalibration {
   std::optional<Eigen::Vector3d> std_deg;     ///< roll, pitch, yaw of the IMU's axes against the vehicle's
 };
 
-/// The rear axle's centre, on the ground, seen from the IMU in body axes.
-struct AxlePlace {
+/// Where something sits, seen from the IMU in body axes, and how well that is known.
+struct PlaceOnVehicle {
   Eigen::Vector3d p;    ///< m
   Eigen::Vector3d std;  ///< m
 };
@@ -120,8 +121,13 @@ struct Calibration {
   /// Where the vehicle's x axis points in body axes, as far as that is known.
   [[nodiscard]] Eigen::Vector3d forward_in_body() const;
 
-  /// Measured where wheels.lever_arm_body_m tells it; none where the body's origin is the axle; else unknown.
-  [[nodiscard]] AxlePlace rear_axle() const;
+  /// The rear axle's centre: measured where wheels.lever_arm_body_m tells it; nought where the body's origin is the
+  /// axle; else unknown.
+  [[nodiscard]] PlaceOnVehicle rear_axle() const;
+
+  /// The GNSS antenna's phase centre: exactly where gnss.lever_arm_body_m tells it unless a std stands beside it; else
+  /// unknown.
+  [[nodiscard]] PlaceOnVehicle antenna() const;
 };
 
 /// VEHICLE_DIR/calibration.yaml; ConfigError where it is missing or wrong.

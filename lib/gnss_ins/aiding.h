@@ -14,11 +14,11 @@ struct BodyMotion {
 
 /// Antenna position z (m, enu) valid `ahead` seconds after the state's epoch (with the state's own latency and offset).
 Measurement<3> gnss_position(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& z,
-                             const Eigen::Matrix3d& cov, double ahead, const Eigen::Vector3d& p_imu_antenna);
+                             const Eigen::Matrix3d& cov, double ahead);
 
 /// Antenna velocity z (m/s, enu).
 Measurement<3> gnss_velocity(const NavState& x, const BodyMotion& motion, const Eigen::Vector3d& z,
-                             const Eigen::Matrix3d& cov, double ahead, const Eigen::Vector3d& p_imu_antenna);
+                             const Eigen::Matrix3d& cov, double ahead);
 
 /// Yaw of the vehicle's x axis (rad, counterclockwise from east).
 Measurement<1> vehicle_yaw(const NavState& x, double yaw, double sigma);

@@ -38,8 +38,8 @@ void straighten(Measurement<1>& m, const InsCore& core, int axis, double gain, d
   m.alike = (known + left_out * (1.0 + rho) / (1.0 - rho)) / m.R(0, 0);  // Bartlett 1946
 }
 
-Measurement<3> position_of(const InsCore& core, const Pending& p, const Eigen::Vector3d& lever) {
-  Measurement<3> m = gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()), lever);
+Measurement<3> position_of(const InsCore& core, const Pending& p) {
+  Measurement<3> m = gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()));
   m.alike = p.alike;
   if (p.fix_type != FixType::kRtkFixed && core.back().active) {
     m.displaced = 0;
@@ -65,10 +65,10 @@ AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& 
   const NavState& x = core.state();
   switch (p.kind) {
     case PendingKind::kPosition:
-      return core.fuse(AidingSource::kGnssPosition, p.t_us, position_of(core, p, v.p_imu_antenna), gates.nis[3]);
+      return core.fuse(AidingSource::kGnssPosition, p.t_us, position_of(core, p), gates.nis[3]);
     case PendingKind::kVelocity:
-      return core.fuse(AidingSource::kGnssVelocity, p.t_us,
-                       gnss_velocity(x, core.motion(), p.value, p.cov, p.ahead(x), v.p_imu_antenna), gates.nis[3]);
+      return core.fuse(AidingSource::kGnssVelocity, p.t_us, gnss_velocity(x, core.motion(), p.value, p.cov, p.ahead(x)),
+                       gates.nis[3]);
     case PendingKind::kHeading:
       return core.fuse(AidingSource::kGnssHeading, p.t_us, vehicle_yaw(x, p.value.x(), std::sqrt(p.cov(0, 0))),
                        gates.nis[1]);
@@ -89,7 +89,7 @@ bool AidingApplier::agrees_undisplaced(const InsCore& core, const Pending& p, co
 }
 
 AidingRecord AidingApplier::apply_level(InsCore& core, const Pending& p, const Gates& gates) const {
-  const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
+  const Measurement<3> all = position_of(core, p);
   Measurement<2> level;
   level.residual = all.residual.head<2>();
   level.H = all.H.topRows<2>();
@@ -100,7 +100,7 @@ AidingRecord AidingApplier::apply_level(InsCore& core, const Pending& p, const G
 }
 
 AidingRecord AidingApplier::apply_height(InsCore& core, const Pending& p, const Gates& gates) const {
-  const Measurement<3> all = position_of(core, p, config_.vehicle.p_imu_antenna);
+  const Measurement<3> all = position_of(core, p);
   Measurement<1> height;
   height.residual = all.residual.tail<1>();
   height.H = all.H.bottomRows<1>();

@@ -29,6 +29,7 @@ struct GnssInsVehicle {
   Eigen::Vector2d mounting = Eigen::Vector2d::Zero();               ///< rad, pitch and yaw: NavState
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw of imu against vehicle
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();          ///< m, imu axes
+  Eigen::Vector3d p_imu_antenna_std = Eigen::Vector3d::Zero();      ///< m
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();             ///< m, where wheels measure, imu axes
   Eigen::Vector3d p_imu_axle_std = Eigen::Vector3d::Zero();         ///< m
 };

@@ -213,8 +213,7 @@ bool GnssIns::moved_meanwhile(double dt) const {
   const NavState& before = core()->state();
   if (before.velocity.norm() > kMoving) return true;
   if (!fix_ || fix_->t_us <= before.t_us) return false;
-  const Eigen::Vector3d way =
-      enu_->enu(fix_->antenna) - before.position - before.q_enu_imu * config_.vehicle.p_imu_antenna;
+  const Eigen::Vector3d way = enu_->enu(fix_->antenna) - before.position - before.q_enu_imu * before.p_imu_antenna;
   return way.head<2>().norm() > kMoving * dt + 3.0 * std::sqrt(fix_->cov_enu(0, 0) + fix_->cov_enu(1, 1));
 }
 

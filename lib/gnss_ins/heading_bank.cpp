@@ -47,6 +47,7 @@ ErrorVector start_sigmas(const GnssInsConfig& c, double yaw_std) {
   std(kVelocityLatency) = time.velocity_latency;
   std(kImuOffset) = time.imu_offset;
   std.segment<3>(kAxle) = v.p_imu_axle_std;
+  std.segment<3>(kAntenna) = v.p_imu_antenna_std;
   return std;
 }
 
@@ -81,7 +82,8 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   x.velocity = s.velocity;
   x.mounting = config_.vehicle.mounting;
   x.p_imu_axle = config_.vehicle.p_imu_axle;
-  x.position = s.antenna - x.q_enu_imu * config_.vehicle.p_imu_antenna;
+  x.p_imu_antenna = config_.vehicle.p_imu_antenna;
+  x.position = s.antenna - x.q_enu_imu * x.p_imu_antenna;
   cores_.emplace_back(config_, anchor);
   log_weights_.push_back(weight);
   InsCore& core = cores_.back();
@@ -96,8 +98,7 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   (void)core.fuse(AidingSource::kZeroVelocity, s.t_us, levelling(x, s.mean_accel, gravity, s.accel_std), kNoGate);
   const BodyMotion still;
   (void)core.fuse(AidingSource::kGnssPosition, s.t_us,
-                  gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0, config_.vehicle.p_imu_antenna),
-                  kNoGate);
+                  gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0), kNoGate);
   Measurement<3> velocity = zero_velocity(core.state(), s.velocity_std);
   velocity.residual += s.velocity;
   (void)core.fuse(AidingSource::kGnssVelocity, s.t_us, velocity, kNoGate);

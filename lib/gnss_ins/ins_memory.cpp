@@ -11,8 +11,8 @@ namespace {
 constexpr double kTurnOnChange = 0.3;
 
 int state_of(int kept) {
-  constexpr int kAxleKept = InsMemory::kKept - 3;
-  return kept < kAxleKept ? InsMemory::kFirst + kept : kAxle + kept - kAxleKept;
+  constexpr int kPlacesKept = InsMemory::kKept - 6;
+  return kept < kPlacesKept ? InsMemory::kFirst + kept : kAxle + kept - kPlacesKept;
 }
 
 /// What is kept of a state, as differences from nought.
@@ -25,6 +25,7 @@ ErrorVector parameters(const NavState& x) {
   zero.wheel_scale = 0.0;
   zero.mounting.setZero();
   zero.p_imu_axle.setZero();
+  zero.p_imu_antenna.setZero();
   return local(zero, x);
 }
 

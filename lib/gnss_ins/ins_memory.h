@@ -8,11 +8,11 @@
 namespace roadfix {
 
 struct InsMemory {
-  static constexpr int kFirst = kGyroBias;  ///< error states that are kept: from here to the mounting, and the axle
-  static constexpr int kKept = kPositionLatency - kGyroBias + 3;
+  static constexpr int kFirst = kGyroBias;  ///< error states that are kept: from here to the mounting, axle, antenna
+  static constexpr int kKept = kPositionLatency - kGyroBias + 6;
   using Kept = Eigen::Matrix<double, kKept, 1>;
 
-  Kept value = Kept::Zero();  ///< biases, scales, mounting, the axle's place; clocks start anew
+  Kept value = Kept::Zero();  ///< biases, scales, mounting, axle, antenna; clocks start anew
   Kept sigma = Kept::Zero();
   bool parked = false;  ///< it stood, its heading and place known: the rest holds unless it is moved
   Geodetic place;       ///< of the imu

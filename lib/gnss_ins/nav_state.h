@@ -24,7 +24,8 @@ inline constexpr int kPositionLatency = 24;  ///< s, age of a GNSS position at i
 inline constexpr int kVelocityLatency = 25;  ///< s, age of a GNSS velocity at its stamp
 inline constexpr int kImuOffset = 26;        ///< s, IMU stamp minus true time
 inline constexpr int kAxle = 27;             ///< m, imu axes: the point without sideslip, whose speed the wheels tell
-inline constexpr int kStates = 30;
+inline constexpr int kAntenna = 30;          ///< m, imu axes: the GNSS antenna's phase centre
+inline constexpr int kStates = 33;
 inline constexpr int kInertialStates = 21;  ///< those that the mechanisation couples
 
 using ErrorVector = Eigen::Matrix<double, kStates, 1>;
@@ -44,14 +45,15 @@ struct NavState {
   double position_latency = 0.0;
   double velocity_latency = 0.0;
   double imu_offset = 0.0;
-  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();  ///< m
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();     ///< m
+  Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();  ///< m
 
   [[nodiscard]] Eigen::Matrix3d R_imu_vehicle() const;
 
   template <class Archive>
   void serialise(Archive& a) {
     a(t_us, position, velocity, q_enu_imu.coeffs(), gyro_bias, accel_bias, gyro_scale, accel_scale, wheel_scale,
-      mounting, position_latency, velocity_latency, imu_offset, p_imu_axle);
+      mounting, position_latency, velocity_latency, imu_offset, p_imu_axle, p_imu_antenna);
   }
 };
 

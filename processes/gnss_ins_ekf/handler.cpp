@@ -45,7 +45,7 @@ class GnssInsStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
-    spec_.state_layout = 6;
+    spec_.state_layout = 7;
     spec_.clocks = {{kImu, 200'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
@@ -167,7 +167,6 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     take_known(imu->time_offset_std, v.time_offset_std);
   }
   if (const auto& gnss = calibration.sensors.gnss) {
-    take_known(gnss->lever_arm, v.p_imu_antenna);
     take_known(gnss->position_latency_std, v.position_latency_std);
     // One receiver, one way through it, unless the calibration knows better.
     v.velocity_latency_std = gnss->velocity_latency_std.value_or(v.position_latency_std);
@@ -177,7 +176,9 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     take_known(wheels->speed_noise, v.wheel_noise);
     take_known(wheels->track_width, v.track_width);
   }
-  const AxlePlace axle = calibration.rear_axle();
+  const PlaceOnVehicle antenna = calibration.antenna(), axle = calibration.rear_axle();
+  v.p_imu_antenna = antenna.p;
+  v.p_imu_antenna_std = antenna.std;
   v.p_imu_axle = axle.p;
   v.p_imu_axle_std = axle.std;
   if (const auto& mag = calibration.sensors.mag) {

@@ -181,7 +181,7 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
     take_known(wheels->speed_noise, s.wheel_noise);
     s.track_width = wheels->track_width;
   }
-  const AxlePlace axle = calibration.rear_axle();
+  const PlaceOnVehicle axle = calibration.rear_axle();
   s.p_imu_axle = axle.p;
   s.p_imu_axle_std = axle.std;
   if (const auto& mag = calibration.sensors.mag) {

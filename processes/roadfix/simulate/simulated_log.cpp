@@ -183,9 +183,13 @@ Calibration calibration_of(const SimulatedDrive& drive) {
   };
   const GnssConfig& gnss = config.gnss;
   if (gnss.rate_hz > 0.0) {
-    c.sensors.gnss =
-        GnssCalibration{gnss.rate_hz, Eigen::Vector3d(T_body_vehicle * gnss.lever_arm_m), HeightKind::kEllipsoid,
-                        std::abs(gnss.position_latency_s), std::abs(gnss.velocity_latency_s)};
+    c.sensors.gnss = GnssCalibration{gnss.rate_hz,
+                                     Eigen::Vector3d(T_body_vehicle * gnss.lever_arm_m),
+                                     std::nullopt,
+                                     HeightKind::kEllipsoid,
+                                     std::abs(gnss.position_latency_s),
+                                     std::abs(gnss.velocity_latency_s)};
+    if (gnss.lever_arm_std_m > 0.0) c.sensors.gnss->lever_arm_std = gnss.lever_arm_std_m;  // else exact
   }
   const WheelsConfig& wheels = config.wheels;
   if (wheels.layout != WheelLayout::kNone) {

@@ -13,7 +13,7 @@ body_origin: rear_axle
 sensors:
   imu: {rate_hz: 100, gyro_noise_radps_per_rthz: 1.0e-3, accel_noise_mps2_per_rthz: 1.0e-2, gyro_bias_std_radps: 1.0e-2,
         accel_bias_std_mps2: 0.2, scale_std: 5.0e-3, correlation_s: 600, time_offset_std_s: 0.02}
-  gnss: {rate_hz: 1, lever_arm_body_m: [0.1, -0.2, 1.5], height: msl, position_latency_std_s: 0.7, velocity_latency_std_s: 0.1}
+  gnss: {rate_hz: 1, lever_arm_body_m: [0.1, -0.2, 1.5], lever_arm_std_m: 0.02, height: msl, position_latency_std_s: 0.7, velocity_latency_std_s: 0.1}
   wheels: {rate_hz: 10, speed_scale_std: 0.01, speed_noise_mps: 0.03, track_width_m: 1.6, lever_arm_body_m: [-0.7, 0.1, -0.3], lever_arm_std_m: 0.1}
   mag: {declination_deg: 3.5, hard_iron_ut: [1, 2, 3], soft_iron: [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]}
   camera_left:
@@ -37,6 +37,7 @@ TEST_CASE("a full calibration is read and written without loss") {
   CHECK(c.sensors.imu->correlation == 600.0);
   CHECK(c.sensors.gnss->height == HeightKind::kMeanSeaLevel);
   CHECK(c.sensors.gnss->lever_arm->y() == -0.2);
+  CHECK(c.sensors.gnss->lever_arm_std == 0.02);
   CHECK(c.sensors.wheels->lever_arm->x() == -0.7);
   CHECK(c.sensors.wheels->lever_arm_std == 0.1);
   CHECK(c.sensors.mag->soft_iron.value()(1, 2) == 0.1);
@@ -64,10 +65,20 @@ TEST_CASE("the rear axle stands where the calibration tells, with what is known 
   const auto axle = [](const std::string& text) { return parse_calibration(text, "calibration.yaml").rear_axle(); };
   CHECK(axle("sensors: {wheels: {rate_hz: 10}}\n").std == Eigen::Vector3d(1.0, 0.5, 0.5));  // nobody knows
   CHECK(axle("body_origin: rear_axle\nsensors: {}\n").std.isZero());
-  const AxlePlace measured = axle("sensors: {wheels: {lever_arm_body_m: [-0.7, 0.1, -0.3]}}\n");
+  const PlaceOnVehicle measured = axle("sensors: {wheels: {lever_arm_body_m: [-0.7, 0.1, -0.3]}}\n");
   CHECK(measured.p == Eigen::Vector3d(-0.7, 0.1, -0.3));
   CHECK(measured.std == Eigen::Vector3d::Constant(0.05));
   CHECK(axle("sensors: {wheels: {lever_arm_body_m: [1, 0, 0], lever_arm_std_m: 0.2}}\n").std.x() == 0.2);
+}
+
+TEST_CASE("the antenna stands exactly where the calibration tells, unless that says how well it is known") {
+  const auto antenna = [](const std::string& text) { return parse_calibration(text, "calibration.yaml").antenna(); };
+  CHECK(antenna("sensors: {gnss: {rate_hz: 10}}\n").std == Eigen::Vector3d(1.0, 0.5, 1.0));  // nobody knows
+  CHECK(antenna("sensors: {gnss: {lever_arm_body_m: [-0.3, 0, 1.4]}}\n").std.isZero());
+  const PlaceOnVehicle measured =
+      antenna("sensors: {gnss: {lever_arm_body_m: [-0.3, 0, 1.4], lever_arm_std_m: 0.05}}\n");
+  CHECK(measured.p == Eigen::Vector3d(-0.3, 0.0, 1.4));
+  CHECK(measured.std == Eigen::Vector3d::Constant(0.05));
 }
 
 TEST_CASE("a wrong calibration says what is wrong") {

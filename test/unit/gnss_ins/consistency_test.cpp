@@ -216,6 +216,36 @@ TEST_CASE("an IMU off the rear axle is as good as one over it, whether the calib
   CHECK(wrong.squares > 4.0 * wrong.variances);
 }
 
+TEST_CASE("an antenna that is measured roughly, or not at all, is found") {
+  ScenarioConfig truth = scenario("city_loop");
+  truth.gnss.lever_arm_std_m = 0.05;
+  const auto level = [&](const char* name, const std::function<void(GnssInsVehicle&)>& change) {
+    test::LevelScore score;
+    for (uint64_t seed = 1; seed <= 10; ++seed) {
+      GnssInsConfig config = test::filter_config(truth);
+      change(config.vehicle);
+      GnssIns filter(config);
+      score.run(filter, simulate(truth, seed), 40.0, 120.0);
+    }
+    std::printf("antenna %s: level error squared over variance %.2f, rms %.3f m, within 3 sigma %.4f\n", name,
+                score.squares / score.variances, std::sqrt(score.squares / score.scored), score.share());
+    return score;
+  };
+  const test::LevelScore measured = level("measured", [](GnssInsVehicle& v) { v.p_imu_antenna_std.setConstant(0.05); });
+  const test::LevelScore unknown = level("unknown", [](GnssInsVehicle& v) {
+    v.p_imu_antenna.setZero();
+    v.p_imu_antenna_std << 1.0, 0.5, 1.0;
+  });
+  for (const test::LevelScore& score : {measured, unknown}) {
+    CHECK(score.share() >= 0.98);
+    CHECK(score.squares < 1.5 * score.variances);
+  }
+  // Teeth: called exact, its error is the filter's.
+  const test::LevelScore exact = level("called exact", [](GnssInsVehicle&) {});
+  CHECK(exact.share() < 0.7);
+  CHECK(exact.squares > 1.5 * measured.squares);
+}
+
 TEST_CASE("a mounting that the calibration tells is as good as none") {
   ScenarioConfig truth = scenario("city_loop");
   truth.imu.mounting_std_rad.setConstant(0.05);

@@ -150,16 +150,19 @@ TEST_CASE("what is remembered is as sure as the calibration allows and no surer"
   CHECK((x.gyro_bias - cut().memory.value.head<3>()).norm() < 1e-12);
 }
 
-TEST_CASE("the axle's place is remembered as it was found, whatever the calibration tells next time") {
+TEST_CASE("axle and antenna are remembered as they were found, whatever the calibration tells next time") {
   NavState found;
   found.p_imu_axle = {-0.7, 0.2, -0.4};
+  found.p_imu_antenna = {-0.3, 0.1, 1.4};
   const InsMemory memory = remembered(found, ErrorMatrix(1e-4 * ErrorMatrix::Identity()));
   NavState x;
   x.p_imu_axle = {-0.6, 0.1, -0.3};
   ErrorVector std = ErrorVector::Zero();
-  std.segment<3>(kAxle).setConstant(0.05);
+  x.p_imu_antenna = {-0.2, 0.1, 1.4};
+  std.segment<6>(kAxle).setConstant(0.05);
   recall(memory, x, std);
   CHECK((x.p_imu_axle - found.p_imu_axle).norm() < 1e-12);
+  CHECK((x.p_imu_antenna - found.p_imu_antenna).norm() < 1e-12);
   // Where the calibration calls its own exact, that holds.
   x.p_imu_axle = {-0.6, 0.1, -0.3};
   std.setZero();

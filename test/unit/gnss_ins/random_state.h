@@ -34,6 +34,7 @@ class RandomState {
     x.velocity_latency = number(0.1);
     x.imu_offset = number(0.1);
     x.p_imu_axle = {number(1.0), 0.4, -0.6};
+    x.p_imu_antenna = {-0.3, 0.2, 1.4};
     return x;
   }
 
