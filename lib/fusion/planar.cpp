@@ -72,13 +72,25 @@ Odometry in_other_frame(const SE3& T_other_frame, const Odometry& o) {
 
 namespace {
 
-/// P - C C', C made shorter where P does not hold as much.
+/// P - C C', C made shorter where P does not hold as much; nothing of it where P has a direction without any error.
 template <int N, int M>
 void take_out(const Eigen::Matrix<double, N, M>& C, Eigen::Matrix<double, N, N>& P) {
   if (C.isZero(0.0)) return;
-  const Eigen::Matrix<double, M, M> share = C.transpose() * P.ldlt().solve(C);
+  const Eigen::LDLT<Eigen::Matrix<double, N, N>> parts(P);
+  if (!(parts.vectorD().minCoeff() > 0.0)) return;
+  const Eigen::Matrix<double, M, M> share = C.transpose() * parts.solve(C);
   const double held = Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, M, M>>(share).eigenvalues().maxCoeff();
   if (std::isfinite(held)) P -= C * C.transpose() / std::max(1.0, held);
+}
+
+/// C with C C' = P. A matrix that is singular, or that rounding has made so, has no Cholesky root: there by its
+/// eigenvalues, those below zero left out; zero where it is not finite.
+Matrix6d root_of(const Matrix6d& P) {
+  if (!P.allFinite()) return Matrix6d::Zero();
+  const Eigen::LLT<Matrix6d> cholesky(P);
+  if (cholesky.info() == Eigen::Success) return cholesky.matrixL();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> parts(P);
+  return parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 }  // namespace
@@ -90,8 +102,7 @@ Odometry without_common(Odometry o, const CommonError& common) {
 }
 
 Odometry without_picture(Odometry o, const PassingError& passing) {
-  const Matrix6d root = passing.picture.llt().matrixL();
-  take_out<6, 6>(root, o.cov_pose);
+  take_out<6, 6>(root_of(passing.picture), o.cov_pose);
   return o;
 }
 

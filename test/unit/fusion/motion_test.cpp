@@ -1,6 +1,7 @@
 /// What a sample tells of the motion since the one before: its covariance less what is shared, and its velocities.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 
 #include "draws.h"
 #include "fusion/measurement.h"
@@ -120,6 +121,32 @@ TEST_CASE("what a picture has wrong alone is taken out of its covariance, and to
   CHECK((planar.picture - Eigen::Vector3d(0.01, 0.04, 4e-6).asDiagonal().toDenseMatrix()).norm() < 1e-12);
   CHECK((planar.map - 2.0 * planar.picture).norm() < 1e-12);
   CHECK(planar.map_time == 1.5);
+}
+
+TEST_CASE("a picture's error that is singular, or not quite a covariance, is taken out as far as it is one") {
+  Vector6d along;
+  along << 0.2, 0.4, 0.1, 1e-3, 0.0, 2e-3;  // it errs in one direction alone
+  const Matrix6d flat = along * along.transpose();
+  const auto left = [](const Matrix6d& cov, const Matrix6d& picture) {
+    PassingError passing;
+    passing.picture = picture;
+    Odometry o;
+    o.cov_pose = cov;
+    return without_picture(o, passing).cov_pose;
+  };
+  const Matrix6d one = Matrix6d::Identity();
+  CHECK((left(one + flat, flat) - one).norm() < 1e-9);
+  // Rounding, or a sum of losses: an eigenvalue below zero. Only what is an error goes.
+  const Vector6d aside = Vector6d::Unit(4);
+  CHECK((left(one + flat, flat - 1e-3 * aside * aside.transpose()) - one).norm() < 1e-9);
+  CHECK(left(one, Matrix6d::Constant(std::numeric_limits<double>::quiet_NaN())) == one);
+  // Teeth: Cholesky's factor, as far as it came, is no root of it.
+  const Matrix6d unfinished = flat.llt().matrixL();
+  CHECK((unfinished * unfinished.transpose() - flat).norm() > 1e-3);
+  // A pose that is exact in one direction cannot hold an error there: nothing is taken out.
+  Matrix6d exact = one;
+  exact(1, 1) = 0.0;
+  CHECK(left(exact, flat) == exact);
 }
 
 TEST_CASE("an error as a channel's vehicle has it, in the state's axes and lengths") {
