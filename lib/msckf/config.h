@@ -30,9 +30,11 @@ struct MsckfVehicle {
   double wheel_scale_std = 0.01;    ///< 1
   double wheel_noise = 0.05;        ///< m/s
   double track_width = 1.5;         ///< m, for four wheel speeds
-  double mounting_std = 0.02;       ///< rad, pitch and yaw of the vehicle's axes in the imu's
-  Eigen::Vector3d p_imu_vehicle = Eigen::Vector3d::Zero();  ///< m, where wheels measure, imu axes
-  double axle_std = 0.0;  ///< m, how far along the vehicle the point that does not slip may be from there
+  double mounting_std = 0.02;       ///< rad, pitch and yaw of the vehicle's axes in the imu's, about:
+  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();
+  /// m, imu axes: the rear axle's centre, which does not slip and whose speed wheels tell.
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero(), p_imu_axle_std = Eigen::Vector3d::Zero();
+  double axle_std = 0.0;  ///< m, along the vehicle, taken for white: of a place that no wheels tell
 };
 
 /// The window of past poses and the points seen from it.

@@ -38,6 +38,8 @@ Msckf::Msckf(const MsckfConfig& config)
       reason_("waiting for the imu") {
   state_.camera.T_imu_camera = config.vehicle.T_imu_camera;
   state_.camera.time_offset = config.vehicle.time_offset;
+  state_.camera.mounting = config.vehicle.mounting;
+  state_.camera.p_imu_axle = config.vehicle.p_imu_axle;
 }
 
 void Msckf::add(const SeenFrame& frame) {

@@ -56,10 +56,15 @@ bool Msckf::plan_moving(int64_t t_us) {
   plan.t_us = t_us;
   plan.length_us = kShortestUs;
   plan.at.up = (block.accel - turning).normalized();
-  plan.at.v = known->speed * state_.camera.R_imu_vehicle().col(0);
+  // Wheels tell the axle's speed, an INS and the turn the imu's along its x axis; the axle does not slip.
+  const bool of_axle = known->from == MsckfScale::kWheels;
+  const Eigen::Vector3d ahead = state_.camera.R_imu_vehicle().col(0);
+  const Eigen::Vector3d arm = block.gyro.cross(state_.camera.p_imu_axle);
+  plan.at.v = (of_axle ? known->speed : (known->speed + arm.x()) / ahead.x()) * ahead - arm;
   plan.at.camera = state_.camera;
-  plan.speed_std = known->sigma + 0.1;
-  plan.side_std = 0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed);
+  const Eigen::Vector3d arm_std = std::abs(block.gyro.z()) * config_.vehicle.p_imu_axle_std;
+  plan.speed_std = std::hypot(known->sigma + 0.1, of_axle ? arm_std.y() : 0.0);
+  plan.side_std = std::hypot(0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed), arm_std.x());
   plan.tilt_std = std::hypot(0.1, kStartAccel / config_.vehicle.gravity) + block.accel_wander / config_.vehicle.gravity;
   plan.scale = known->from;
   planned_ = plan;
@@ -136,6 +141,7 @@ Eigen::Matrix<double, kBaseSize, 1> Msckf::expected_errors(const MovingStart& pl
   d(kTimeOffset) = known.time_offset - c.time_offset;
   d(kWheelScale) = known.wheel_scale - c.wheel_scale;
   d.segment<2>(kMounting) = known.mounting - c.mounting;
+  d.segment<3>(kAxle) = known.p_imu_axle - c.p_imu_axle;
   return d;
 }
 

@@ -44,7 +44,7 @@ void imu_sample(Archive& a, ImuSample& s) {
 
 template <class Archive>
 void calibrated(Archive& a, Calibrated& c) {
-  a(c.T_imu_camera.q.coeffs(), c.T_imu_camera.p, c.lens, c.time_offset, c.wheel_scale, c.mounting);
+  a(c.T_imu_camera.q.coeffs(), c.T_imu_camera.p, c.lens, c.time_offset, c.wheel_scale, c.mounting, c.p_imu_axle);
 }
 
 constexpr size_t kMost = 1'000'000;

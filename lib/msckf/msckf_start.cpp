@@ -76,6 +76,7 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   set(kTimeOffset, 1, clock_.sigma());
   set(kWheelScale, 1, c.wheel_scale_std);
   set(kMounting, 2, c.mounting_std);
+  P.diagonal().segment<3>(kAxle) = c.p_imu_axle_std.cwiseAbs2();
   // Levelling by a biased accelerometer: phi = (-b_y, b_x, 0) / g in local axes, (M.31).
   Eigen::Matrix<double, 3, 3> tilt = Eigen::Matrix3d::Zero();
   const Eigen::Matrix3d R = imu.R();

@@ -69,6 +69,7 @@ void State::retract(const Eigen::VectorXd& d) {
   camera.time_offset += d(kTimeOffset);
   camera.wheel_scale += d(kWheelScale);
   camera.mounting += d.segment<2>(kMounting);
+  camera.p_imu_axle += d.segment<3>(kAxle);
   for (Clone& c : clones) {
     const Eigen::Matrix3d dR = exp_so3(part(c.at));
     c.R = Eigen::Quaterniond(dR * c.R).normalized().toRotationMatrix();
@@ -158,6 +159,7 @@ void State::digest(Digest& digest) const {
   digest.add(camera.time_offset);
   digest.add(camera.wheel_scale);
   digest.add(camera.mounting);
+  digest.add(camera.p_imu_axle);
   for (const Clone& c : clones) {
     digest.add(c.R);
     digest.add(c.p);

@@ -36,7 +36,8 @@ enum Block : int {
   kTimeOffset = 30,
   kWheelScale = 31,
   kMounting = 32,  ///< pitch and yaw of the vehicle in the imu
-  kBaseSize = 34
+  kAxle = 34,      ///< imu axes
+  kBaseSize = 37
 };
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxLandmarks;
 
@@ -64,7 +65,8 @@ struct Calibrated {
   Eigen::Vector3d lens = Eigen::Vector3d::Zero();  ///< c_f, c_r and c_q of (M.48)
   double time_offset = 0.0;  ///< s: a picture stamped t was taken at t + time_offset on the imu's clock
   double wheel_scale = 0.0;  ///< measured / true - 1
-  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();  ///< R_imu_vehicle = Exp(0, pitch, yaw)
+  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();    ///< R_imu_vehicle = Exp(0, pitch, yaw)
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();  ///< m, of the point whose speed wheels tell
 
   [[nodiscard]] Eigen::Matrix3d R_imu_vehicle() const;
 };

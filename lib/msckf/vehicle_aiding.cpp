@@ -8,35 +8,37 @@ namespace {
 
 /// Adds the derivatives of some rows of the vehicle's velocity u, (M.25).
 template <int First, int Count>
-void by_velocity(Linear& linear, const State& state, const MsckfVehicle& vehicle, const Eigen::Vector3d& gyro) {
+void by_velocity(Linear& linear, const State& state, const Eigen::Vector3d& gyro) {
   const Eigen::Matrix3d R_vehicle_imu = state.camera.R_imu_vehicle().transpose();
-  const Eigen::Vector3d u = vehicle_velocity(state, vehicle, gyro);
+  const Eigen::Vector3d u = vehicle_velocity(state, gyro);
   const Eigen::Matrix3d by_nu = R_vehicle_imu * state.imu.R().transpose();
-  const Eigen::Matrix3d by_rate = R_vehicle_imu * skew(vehicle.p_imu_vehicle);
+  const Eigen::Matrix3d by_rate = R_vehicle_imu * skew(state.camera.p_imu_axle);
   const Eigen::Matrix3d by_gyro_bias = by_rate * (Eigen::Vector3d::Ones() - state.imu.gyro_scale).asDiagonal();
   const Eigen::Matrix3d by_gyro_scale = by_rate * (gyro - state.imu.gyro_bias).asDiagonal();
+  const Eigen::Matrix3d by_axle = R_vehicle_imu * skew(state.imu.rate(gyro));
   const Eigen::Matrix<double, 3, 2> by_mounting =
       skew(u) * right_jacobian({0.0, state.camera.mounting.x(), state.camera.mounting.y()}).rightCols<2>();
   linear.block(kVel, by_nu.middleRows<Count>(First));
   linear.block(kGyroBias, by_gyro_bias.middleRows<Count>(First));
   linear.block(kGyroScale, by_gyro_scale.middleRows<Count>(First));
   linear.block(kMounting, by_mounting.middleRows<Count>(First));
+  linear.block(kAxle, by_axle.middleRows<Count>(First));
 }
 
 }  // namespace
 
-Eigen::Vector3d vehicle_velocity(const State& state, const MsckfVehicle& vehicle, const Eigen::Vector3d& gyro) {
+Eigen::Vector3d vehicle_velocity(const State& state, const Eigen::Vector3d& gyro) {
   const Eigen::Vector3d in_imu =
-      state.imu.q.conjugate() * state.imu.v + state.imu.rate(gyro).cross(vehicle.p_imu_vehicle);
+      state.imu.q.conjugate() * state.imu.v + state.imu.rate(gyro).cross(state.camera.p_imu_axle);
   return state.camera.R_imu_vehicle().transpose() * in_imu;
 }
 
 Linear wheel_speed(const State& state, const MsckfVehicle& vehicle, const Eigen::Vector3d& gyro, double speed) {
   // Both sides over 1 + scale: the residual is in true metres, and the derivative by the scale is simple.
   const double gain = 1.0 + state.camera.wheel_scale;
-  const double u = vehicle_velocity(state, vehicle, gyro).x();
+  const double u = vehicle_velocity(state, gyro).x();
   Linear linear(1);
-  by_velocity<0, 1>(linear, state, vehicle, gyro);
+  by_velocity<0, 1>(linear, state, gyro);
   linear.block(kWheelScale, Eigen::Matrix<double, 1, 1>(u / gain));
   linear.residual(Eigen::Matrix<double, 1, 1>(speed / gain - u));
   linear.whiten(Eigen::Matrix<double, 1, 1>(vehicle.wheel_noise / gain));
@@ -45,8 +47,8 @@ Linear wheel_speed(const State& state, const MsckfVehicle& vehicle, const Eigen:
 
 Linear no_sideslip(const State& state, const MsckfConfig& config, const Eigen::Vector3d& gyro, double acceleration) {
   Linear linear(2);
-  by_velocity<1, 2>(linear, state, config.vehicle, gyro);
-  const Eigen::Vector2d slip = vehicle_velocity(state, config.vehicle, gyro).tail<2>();
+  by_velocity<1, 2>(linear, state, gyro);
+  const Eigen::Vector2d slip = vehicle_velocity(state, gyro).tail<2>();
   linear.residual(-slip);
   const MsckfAiding& a = config.aiding;
   const double lever = config.vehicle.axle_std * state.imu.rate(gyro).z();  // m/s, what an unknown axle makes of a turn

@@ -6,8 +6,8 @@
 
 namespace roadfix::msckf {
 
-/// Velocity of the point where wheels measure, vehicle axes; `rate`: raw gyro.
-Eigen::Vector3d vehicle_velocity(const State& state, const MsckfVehicle& vehicle, const Eigen::Vector3d& gyro);
+/// Velocity of the axle's centre, vehicle axes; `gyro`: raw.
+Eigen::Vector3d vehicle_velocity(const State& state, const Eigen::Vector3d& gyro);
 
 Linear wheel_speed(const State& state, const MsckfVehicle& vehicle, const Eigen::Vector3d& gyro, double speed);
 /// Lateral and vertical; `acceleration`: lateral, m/s2.

@@ -13,6 +13,7 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 #include "vo_tracker/camera_rig.h"
 #include "vo_tracker/messages.h"
 #include "vo_tracker/picture.h"
@@ -27,7 +28,9 @@ constexpr int64_t kFeedback_us = 500'000;        // DESIGN.md, section 4
 constexpr int64_t kWheelLateness_us = 50'000;    // there, too
 constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
 constexpr int64_t kImuTimeout_us = 200'000;
-constexpr double kUnknownAxle_m = 1.0;  // standard deviation of the rear axle from the imu, where nothing is said
+// Standard deviation of the rear axle's centre from the imu, where nothing is said: about as far as one may be.
+const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);
+constexpr double kTapeMeasure_m = 0.05;  // what a distance within a car is known to that somebody measured
 
 int8_t pose_state(const MsckfOutput& out) {
   if (out.phase == MsckfPhase::kLost) return pose_t::STATE_LOST;
@@ -66,14 +69,24 @@ MsckfVehicle msckf_vehicle(const Calibration& calibration) {
   take_known(left.rate, v.camera_rate);
   take_known(left.mounting->std, v.camera_std);
   if (left.mounting->std_deg) v.camera_turn_std = *left.mounting->std_deg * kDegree;
+  const bool at_axle = calibration.body_origin == BodyOrigin::kRearAxle;
   if (const auto& wheels = calibration.sensors.wheels) {
+    if (!at_axle) v.p_imu_axle_std = kUnknownAxle_m;
     take_known(wheels->speed_scale_std, v.wheel_scale_std);
     take_known(wheels->speed_noise, v.wheel_noise);
     take_known(wheels->track_width, v.track_width);
+    if (wheels->lever_arm) {
+      v.p_imu_axle = *wheels->lever_arm;
+      v.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure_m));
+    }
+  } else if (!at_axle) {
+    v.axle_std = kUnknownAxle_m.x();
   }
   if (calibration.mounting && calibration.mounting->std_deg)
     v.mounting_std = calibration.mounting->std_deg->tail<2>().maxCoeff() * kDegree;
-  if (calibration.body_origin != BodyOrigin::kRearAxle) v.axle_std = kUnknownAxle_m;
+  // The shortest turn from the imu's x axis to the vehicle's: roll does not show.
+  const Eigen::Vector3d forward = calibration.forward_in_body();
+  v.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward)).tail<2>();
   return v;
 }
 
@@ -96,7 +109,7 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
-  spec_.state_layout = 6;
+  spec_.state_layout = 7;
 }
 
 void MsckfStage::make_parts() {

@@ -111,6 +111,16 @@ MsckfConfig filter_config(const VisualDriveConfig& config) {
   return c;
 }
 
+SE3 imu_place(const SimulatedDrive& drive) { return {drive.errors.q_vehicle_imu, drive.config.imu.position_m}; }
+
+void tell_place(const SimulatedDrive& drive, MsckfVehicle& vehicle) {
+  const SE3 T_imu_vehicle = imu_place(drive).inverse();
+  vehicle.T_imu_camera = T_imu_vehicle * T_vehicle_camera();
+  vehicle.p_imu_axle = T_imu_vehicle.p;
+  const Eigen::Vector3d ahead = T_imu_vehicle.q * Eigen::Vector3d::UnitX();
+  vehicle.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), ahead)).tail<2>();
+}
+
 void run(Msckf& filter, const VisualDrive& drive, bool wheels, const std::function<void(const Msckf&)>& seen) {
   size_t frame = 0, wheel = 0;
   for (const ImuSample& imu : drive.drive.imu) {
@@ -123,13 +133,16 @@ void run(Msckf& filter, const VisualDrive& drive, bool wheels, const std::functi
 }
 
 Eigen::Matrix<double, 9, 1> error_of(const Odometry& estimate, const VisualDrive& drive) {
+  const SE3 T_vehicle_imu = imu_place(drive.drive);
   const Odometry start = drive.drive.truth_at(drive.drive.imu.front().t_us);
-  const SE3 T_local_enu = SE3{exp_q({0.0, 0.0, -yaw_of(start.T_frame_vehicle.q)}), Eigen::Vector3d::Zero()} *
-                          SE3{Eigen::Quaterniond::Identity(), -start.T_frame_vehicle.p};
+  const SE3 T_enu_start = start.T_frame_vehicle * T_vehicle_imu;
+  const SE3 T_local_enu = SE3{exp_q({0.0, 0.0, -yaw_of(T_enu_start.q)}), Eigen::Vector3d::Zero()} *
+                          SE3{Eigen::Quaterniond::Identity(), -T_enu_start.p};
   const Odometry truth = drive.drive.truth_at(estimate.t_us);
+  const Eigen::Vector3d velocity = truth.velocity + truth.angular_rate.cross(T_vehicle_imu.p);
   Eigen::Matrix<double, 9, 1> e;
-  e.head<6>() = local(estimate.T_frame_vehicle, T_local_enu * truth.T_frame_vehicle);
-  e.tail<3>() = truth.velocity - estimate.velocity;
+  e.head<6>() = local(estimate.T_frame_vehicle, T_local_enu * truth.T_frame_vehicle * T_vehicle_imu);
+  e.tail<3>() = T_vehicle_imu.q.conjugate() * velocity - estimate.velocity;
   return e;
 }
 

@@ -37,11 +37,15 @@ VisualDrive make_drive(const VisualDriveConfig& config, uint64_t seed);
 /// What a calibration of this car says.
 MsckfConfig filter_config(const VisualDriveConfig& config);
 SE3 T_vehicle_camera();
+/// Of the imu in the vehicle.
+SE3 imu_place(const SimulatedDrive& drive);
+/// Camera, axle and mounting as an imu that sits there has them.
+void tell_place(const SimulatedDrive& drive, MsckfVehicle& vehicle);
 
 /// Feeds everything in the order of stamps and calls seen(filter) after every imu sample.
 void run(Msckf& filter, const VisualDrive& drive, bool wheels, const std::function<void(const Msckf&)>& seen);
 
-/// Error (position and rotation of local(), velocity in vehicle axes) of an output that began at rest at the start.
+/// Error (position and rotation of local(), velocity, imu axes) of an output that began at rest at the start.
 Eigen::Matrix<double, 9, 1> error_of(const Odometry& estimate, const VisualDrive& drive);
 
 }  // namespace roadfix::test

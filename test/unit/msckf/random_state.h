@@ -33,6 +33,7 @@ inline msckf::State random_state(int number) {
   s.camera.time_offset = 0.01;
   s.camera.wheel_scale = 0.02;
   s.camera.mounting = 0.02 * draw(random, angle).head<2>();
+  s.camera.p_imu_axle = draw(random, 1.0);
   for (int i = 0; i < 3; ++i) {
     const int at = s.grow(6);
     s.clones.push_back(

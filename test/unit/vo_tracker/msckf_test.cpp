@@ -12,6 +12,7 @@
 #include "geometry/determinism.h"
 #include "streams.h"
 #include "vo_tracker/handler.h"
+#include "vo_tracker/msckf_stage.h"
 
 namespace roadfix {
 namespace {
@@ -83,6 +84,33 @@ Collector run(const std::vector<Sent>& messages) {
   StageRunner runner(make_vo_tracker(calibration(), config()), sink);
   for (const Sent& m : messages) feed(runner, m);
   return sink;
+}
+
+TEST_CASE("mode msckf: the calibration tells where the axle is and how the imu is mounted") {
+  const MsckfVehicle silent = msckf_vehicle(calibration());
+  CHECK(silent.p_imu_axle.isZero(0.0));
+  CHECK(silent.p_imu_axle_std.isZero(0.0));
+  CHECK(silent.axle_std == 1.0);
+  CHECK(silent.mounting.isZero(0.0));
+  Calibration told = calibration();
+  told.sensors.wheels.emplace();
+  CHECK(msckf_vehicle(told).p_imu_axle_std == Eigen::Vector3d(1.0, 0.5, 0.5));
+  CHECK(msckf_vehicle(told).axle_std == 0.0);
+  told.sensors.wheels->lever_arm = Eigen::Vector3d(-1.2, -0.4, -0.8);
+  told.mounting.emplace().angles_deg = Eigen::Vector3d(0.0, 2.0, 3.0);  // the imu's nose down and to the left
+  const MsckfVehicle v = msckf_vehicle(told);
+  CHECK(v.p_imu_axle == Eigen::Vector3d(-1.2, -0.4, -0.8));
+  CHECK(v.p_imu_axle_std == Eigen::Vector3d::Constant(0.05));
+  msckf::Calibrated c;
+  c.mounting = v.mounting;
+  CHECK((c.R_imu_vehicle().col(0) - told.forward_in_body()).norm() < 1e-12);
+  CHECK(v.mounting.y() == Approx(-3.0 * M_PI / 180).epsilon(0.01));
+  told.sensors.wheels->lever_arm_std = 0.2;
+  CHECK(msckf_vehicle(told).p_imu_axle_std == Eigen::Vector3d::Constant(0.2));
+  told.body_origin = BodyOrigin::kRearAxle;
+  told.sensors.wheels.reset();
+  CHECK(msckf_vehicle(told).p_imu_axle_std.isZero(0.0));
+  CHECK(msckf_vehicle(told).axle_std == 0.0);
 }
 
 TEST_CASE("mode msckf: valid while parked, then follows the street") {
