@@ -28,7 +28,8 @@ struct ChannelSample {
   Odometry odometry;  ///< covariances without what the channel's whole way has in common: without_common()
   std::optional<PlanarPassing> passing;  ///< of a vision that tells it; picture's part not in the odometry's covariance
   int reset_counter = 0;
-  bool metric = true;  ///< false: lengths are up to a common factor
+  bool metric = true;        ///< false: lengths are up to a common factor
+  bool turns_exact = false;  ///< as in CommonError
   /// A filter over the gyro that the INS uses (an MSCKF): its yaw is no second witness, and its poses take back what
   /// its whole way has had wrong, so that its velocities tell its motion.
   bool shares_imu = false;
@@ -176,6 +177,7 @@ class Fusion {
   FuseStatus fuse_motion(const ChannelSample& sample, const LevelView& view, FusionChannelReport& report);
   [[nodiscard]] Planar motion_of(FusionChannel channel, const LevelView& last, const LevelView& now) const;
   [[nodiscard]] bool scale_is_open(const ChannelSample& sample, const Planar& motion);
+  void hear_of_turns(bool exact);
   void follow_ins_errors(const Odometry& ins, double dt, bool was_away);
   /// m2/s2, east and north, by which the INS's velocity, with covariance P, is unsurer than what lasts of its error.
   [[nodiscard]] Eigen::Vector2d grown_velocity_variance(const Eigen::Matrix2d& P) const;
@@ -247,6 +249,7 @@ class Fusion {
   double distrust_ = 0.0;          ///< m/s, of the INS velocity after a contradiction
   std::optional<int64_t> last_tie_us_;
   bool vo_scale_open_ = true;  ///< a non-metric vision's scale has no value yet
+  bool vo_turns_exact_ = false;
   ReturnState comeback_;
   PlanarEstimate local_;
   LastingVelocity lasting_;  ///< of the local pose

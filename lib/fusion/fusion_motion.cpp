@@ -43,6 +43,13 @@ bool Fusion::scale_is_open(const ChannelSample& s, const Planar& motion) {
   return true;
 }
 
+/// What its turns share is nothing, or was, and is to be learnt from now on.
+void Fusion::hear_of_turns(bool exact) {
+  if (exact == vo_turns_exact_) return;
+  vo_turns_exact_ = exact;
+  for (Mode& mode : imm_.modes) set_independent(mode.estimate, kVoTurns, 0.0, exact ? 0.0 : config_.vo_turns_std);
+}
+
 /// Two channels that integrate the same gyro are not two witnesses of the yaw: the better one speaks.
 bool Fusion::better_yaw_elsewhere(const ChannelSample& s, double variance) const {
   const FusionChannel other = s.channel == FusionChannel::kIns ? FusionChannel::kVo : FusionChannel::kIns;
@@ -124,6 +131,7 @@ FuseStatus Fusion::fuse_motion(const ChannelSample& s, const LevelView& view, Fu
   }
   if (!m.last || dt <= 0.0) return FuseStatus::kNotReady;
   if (ins) ins_corrected_ = corrected(m.view, view);
+  if (s.channel == FusionChannel::kVo) hear_of_turns(s.turns_exact);
   const Planar motion = motion_of(s.channel, m.view, view);
   if (scale_is_open(s, motion)) return FuseStatus::kNotReady;
 

@@ -124,7 +124,7 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
   FrameTie::visit_members(self.tie_, visit);
   visit(self.restart_us_, self.refused_since_us_, self.last_fix_us_, self.foreign_, self.ins_corrected_,
         self.passes_needed_, self.doubt_, self.distrust_, self.ins_drift_std_, self.last_tie_us_, self.vo_scale_open_,
-        self.height_us_);
+        self.vo_turns_exact_, self.height_us_);
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);

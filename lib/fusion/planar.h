@@ -93,6 +93,7 @@ class LastingVelocity {
 struct CommonError {
   Eigen::Matrix<double, 6, 2> columns = Eigen::Matrix<double, 6, 2>::Zero();  ///< of its pose, per sigma
   double scale_std = 0.0;                                                     ///< of its velocity, relative
+  bool turns_exact = false;  ///< its turns share nothing: so two eyes say whose focal length is exact
 };
 /// The pose with covariances that do not hold that any more: it is one scale and one drift here, not new in each step.
 /// At most as much of it is taken out as there is.

@@ -47,7 +47,7 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.state_layout = 5;
+    spec_.state_layout = 6;
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0}, {"POSE_INS", "pose_t", 0, 0},
                     {"VO_STATUS", "vo_status_t", 200'000, 0},  {"POSE_VO", "pose_t", 200'000, 0},
                     {"POSE_WHEEL", "pose_t", 50'000, 0},       {"HORIZON_IMM_FUSION", "horizon_t", 0, 0}};
@@ -116,6 +116,7 @@ class ImmFusionStage final : public Stage {
     writer.put(vo_shares_imu_);
     writer.put(vo_common_.columns);
     writer.put(vo_common_.scale_std);
+    writer.put(vo_common_.turns_exact);
     writer.put(vo_passing_.has_value());
     if (vo_passing_) {
       writer.put(vo_passing_->picture);
@@ -144,6 +145,7 @@ class ImmFusionStage final : public Stage {
     reader.get(loaded.vo_shares_imu_);
     reader.get(loaded.vo_common_.columns);
     reader.get(loaded.vo_common_.scale_std);
+    reader.get(loaded.vo_common_.turns_exact);
     if (reader.get<bool>()) {
       PassingError& passing = loaded.vo_passing_.emplace();
       reader.get(passing.picture);
@@ -188,6 +190,7 @@ class ImmFusionStage final : public Stage {
     }
     sample.reset_counter = counts_[static_cast<std::size_t>(channel)].after(message);
     sample.shares_imu = channel == FusionChannel::kVo && vo_shares_imu_;
+    sample.turns_exact = channel == FusionChannel::kVo && vo_common_.turns_exact;
     if (channel == FusionChannel::kIns && sample.odometry.validity != Validity::kInvalid) {
       to_first_anchor(anchor_of(message), sample.odometry);
       origin_ = message.origin;

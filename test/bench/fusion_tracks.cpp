@@ -52,6 +52,7 @@ class TracksStage final : public Stage {
     rig.right = rig.left;
     rig.T_vehicle_left = drive.T_vehicle_left;
     rig.T_right_left = drive.T_left_right.inverse();
+    rig.doubt = {};  // as the calibration of a drive says that is rendered: these are the very lenses
     tracker_ = std::make_unique<KeyframeTracker>(KeyframeTrackerConfig{}, rig,
                                                  std::make_unique<test::SimulatedFrontEnd>(seen_), executor_,
                                                  std::make_unique<test::SimulatedRightEye>(seen_));
@@ -131,9 +132,9 @@ void check_same_drive(const test::TrackDrive& drive, uint64_t seed) {
   ScenarioConfig config = drive.drive.config;
   config.camera.layout = CameraLayout::kNone;
   const SimulatedDrive blind = simulate(config, seed);
-  const auto& a = blind.imu.back().accel;
-  const auto& b = drive.drive.imu.back().accel;
-  if (a != b || blind.gnss.back().antenna.latitude != drive.drive.gnss.back().antenna.latitude)
+  const bool imu = blind.imu.back().accel == drive.drive.imu.back().accel;
+  const auto fix = [](const SimulatedDrive& d) { return d.gnss.empty() ? 0.0 : d.gnss.back().antenna.latitude; };
+  if (!imu || fix(blind) != fix(drive.drive))
     throw std::runtime_error("a camera changes the other sensors of this drive");
 }
 

@@ -92,6 +92,26 @@ TEST_CASE("what a vision's turns have wrong alike is learnt while GNSS is good")
   CHECK(std::abs(closed.second - closed.first) > 0.5 * std::abs(turns));  // teeth
 }
 
+TEST_CASE("of turns that are said to share nothing nothing is learnt, until it is said no longer") {
+  constexpr double kEyeLost = 60.0;  // s, in the outage
+  const double prior = FusionConfig{}.vo_turns_std;
+  Tunnel t;
+  t.vo.turns_std = 0.0;
+  std::vector<StreamEvent> events = t.events();
+  for (StreamEvent& e : events)
+    e.sample.turns_exact = seconds(t.drive, e.sample.odometry.t_us) < kEyeLost;  // the wheels' is not read
+  Fusion fusion({});
+  double before = 0.0, after = 0.0;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    const double sigma = std::sqrt(f.estimate().P(kVoTurns, kVoTurns));
+    if (s > 1.0 && s < kEyeLost) before = std::max(before, sigma);
+    if (s > kEyeLost + 0.2) after = std::max(after, sigma);
+  });
+  CHECK(before == 0.0);
+  CHECK(std::abs(after - prior) < 0.1 * prior);
+}
+
 /// What the fusion takes for the log scale of a vision, of which alone it hears, and whose velocities are longer than
 /// its motion by `faster`; beside an INS if `with_ins`, where the lengths are too long by `longer`.
 double scale_learnt(double faster, double longer, bool with_ins) {

@@ -43,6 +43,12 @@ class Wire {
   /// What the vision says that its local map has wrong, rad.
   void say_map_yaw(double sigma) { status_.cov_map_m2_rad2[5][5] = sigma * sigma; }
 
+  /// Two eyes, and what their turns share: rad of yaw.
+  void say_stereo(double turned) {
+    status_.scale_source = vo_status_t::SCALE_FROM_STEREO;
+    status_.shared_error_m_rad[1][5] = turned;
+  }
+
   template <class T>
   void put(const std::string& channel, int64_t t_us, T message) {
     message.utime = t_us;
@@ -131,13 +137,14 @@ const SimulatedDrive& drive() {
 double seconds(int64_t t_us) { return seconds_between(drive().config.start_utime, t_us); }
 
 /// GNSS/INS with an outage from 30 s on, vision and wheels.
-std::vector<StreamEvent> events() {
+std::vector<StreamEvent> events(const test::VoNoise& vision = {}) {
   test::InsNoise ins;
   ins.rate_hz = 100.0;
   ins.outages = {{30.0, 55.0}};
   test::VoNoise wheels;
   wheels.rate_hz = 50.0;
-  return test::merged({ins_stream(drive(), ins, 1), test::vo_stream(drive(), {}, 1), wheel_stream(drive(), wheels, 1)});
+  return test::merged(
+      {ins_stream(drive(), ins, 1), test::vo_stream(drive(), vision, 1), wheel_stream(drive(), wheels, 1)});
 }
 
 std::vector<Arrival> arrivals(const std::function<bool(const StreamEvent&)>& there, int64_t late_us = 0) {
@@ -273,6 +280,25 @@ TEST_CASE("what a vision says of its pictures' errors is believed") {
   INFO(sharp << " " << little << " " << unsteady << " rad");
   CHECK(unsteady > 1.08 * sharp);
   CHECK(little < 1.01 * sharp);  // teeth
+}
+
+TEST_CASE("turns share nothing where two eyes say so, and where one eye says nothing they do") {
+  const auto yaw_sigma = [](const std::function<void(Wire&)>& say) {
+    Wire wire;
+    say(wire);
+    test::VoNoise sharp;
+    sharp.yaw_step = 1e-5;  // beside which the turns count
+    sharp.turns_std = 0.0;
+    for (const StreamEvent& e : events(sharp)) wire.put(e);
+    const auto fused = run(wire.take()).all<pose_t>("POSE_FUSED");
+    return std::sqrt(fused[3200].cov_pose_m2_rad2[5][5]);  // after a turn, before the way back
+  };
+  const double exact = yaw_sigma([](Wire& w) { w.say_stereo(0.0); });
+  const double shared = yaw_sigma([](Wire& w) { w.say_stereo(1e-9); });
+  const double one_eye = yaw_sigma([](Wire&) {});
+  INFO(exact << " " << shared << " " << one_eye << " rad");
+  CHECK(exact < 0.9 * one_eye);
+  CHECK(std::abs(shared - one_eye) < 1e-3 * one_eye);  // teeth
 }
 
 TEST_CASE("a dead channel leaves the others' result") {
