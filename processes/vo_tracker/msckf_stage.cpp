@@ -28,9 +28,6 @@ constexpr int64_t kFeedback_us = 500'000;        // DESIGN.md, section 4
 constexpr int64_t kWheelLateness_us = 50'000;    // there, too
 constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
 constexpr int64_t kImuTimeout_us = 200'000;
-// Standard deviation of the rear axle's centre from the imu, where nothing is said: about as far as one may be.
-const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);
-constexpr double kTapeMeasure_m = 0.05;  // what a distance within a car is known to that somebody measured
 
 int8_t pose_state(const MsckfOutput& out) {
   if (out.phase == MsckfPhase::kLost) return pose_t::STATE_LOST;
@@ -69,18 +66,15 @@ MsckfVehicle msckf_vehicle(const Calibration& calibration) {
   take_known(left.rate, v.camera_rate);
   take_known(left.mounting->std, v.camera_std);
   if (left.mounting->std_deg) v.camera_turn_std = *left.mounting->std_deg * kDegree;
-  const bool at_axle = calibration.body_origin == BodyOrigin::kRearAxle;
+  const PlaceOnVehicle axle = calibration.rear_axle();
   if (const auto& wheels = calibration.sensors.wheels) {
-    if (!at_axle) v.p_imu_axle_std = kUnknownAxle_m;
+    v.p_imu_axle = axle.p;
+    v.p_imu_axle_std = axle.std;
     take_known(wheels->speed_scale_std, v.wheel_scale_std);
     take_known(wheels->speed_noise, v.wheel_noise);
     take_known(wheels->track_width, v.track_width);
-    if (wheels->lever_arm) {
-      v.p_imu_axle = *wheels->lever_arm;
-      v.p_imu_axle_std.setConstant(wheels->lever_arm_std.value_or(kTapeMeasure_m));
-    }
-  } else if (!at_axle) {
-    v.axle_std = kUnknownAxle_m.x();
+  } else {
+    v.axle_std = axle.std.x();
   }
   if (calibration.mounting && calibration.mounting->std_deg)
     v.mounting_std = calibration.mounting->std_deg->tail<2>().maxCoeff() * kDegree;
