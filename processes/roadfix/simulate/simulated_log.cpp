@@ -142,7 +142,12 @@ double joint_correlation_s(double constant, double wandering, double tau_s) {
   return std::min(tau_s * (1.0 + ratio * ratio), kLongest);
 }
 
-CameraCalibration camera_calibration(const CameraConfig& camera, const SE3& T_body_camera) {
+/// How far a sensor's stamps get from true time.
+double clock_error_s(const LinkConfig& link, double duration_s) {
+  return std::abs(link.clock_offset_s) + 1e-6 * std::abs(link.clock_drift_ppm) * duration_s;
+}
+
+CameraCalibration camera_calibration(const CameraConfig& camera, const SE3& T_body_camera, double duration_s) {
   CameraCalibration c;
   c.rate = camera.rate_hz;
   c.width_px = camera.width_px;
@@ -153,7 +158,7 @@ CameraCalibration camera_calibration(const CameraConfig& camera, const SE3& T_bo
   if (!camera.distortion.isZero(0.0))
     c.distortion = CameraDistortion{DistortionModel::kRadtan, {camera.distortion.begin(), camera.distortion.end()}};
   c.colour = CameraColour::kGray;
-  c.time_offset_std = std::abs(camera.link.clock_offset_s);
+  c.time_offset_std = clock_error_s(camera.link, duration_s);
   c.stamp_jitter = camera.link.stamp_jitter_s;
   const Eigen::Quaterniond& q = T_body_camera.q;
   c.mounting =
@@ -179,7 +184,7 @@ Calibration calibration_of(const SimulatedDrive& drive) {
       std::max(imu.gyro_scale_std, imu.accel_scale_std),
       std::min(joint_correlation_s(imu.gyro_bias_std_radps, imu.gyro_bias_drift_std_radps, imu.bias_correlation_s),
                joint_correlation_s(imu.accel_bias_std_mps2, imu.accel_bias_drift_std_mps2, imu.bias_correlation_s)),
-      std::abs(imu.link.clock_offset_s),
+      clock_error_s(imu.link, config.duration_s),
   };
   const GnssConfig& gnss = config.gnss;
   if (gnss.rate_hz > 0.0) {
@@ -206,10 +211,10 @@ Calibration calibration_of(const SimulatedDrive& drive) {
   }
   if (config.camera.layout != CameraLayout::kNone) {
     const SE3 T_vehicle_left = nominal_T_vehicle_left(config.camera);
-    c.sensors.camera_left = camera_calibration(config.camera, T_body_vehicle * T_vehicle_left);
+    c.sensors.camera_left = camera_calibration(config.camera, T_body_vehicle * T_vehicle_left, config.duration_s);
     if (config.camera.layout == CameraLayout::kStereo) {
-      c.sensors.camera_right =
-          camera_calibration(config.camera, T_body_vehicle * (T_vehicle_left * T_left_right(config.camera)));
+      c.sensors.camera_right = camera_calibration(
+          config.camera, T_body_vehicle * (T_vehicle_left * T_left_right(config.camera)), config.duration_s);
       c.sensors.stereo = StereoCalibration{0.0, 0.0};  // the drive is rendered through these very lenses
     }
   }
