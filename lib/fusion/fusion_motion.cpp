@@ -23,6 +23,21 @@ bool corrected(const LevelView& last, const LevelView& now) {
   return (now.P.diagonal().array() < (1.0 - kCorrected) * last.P.diagonal().array()).any();
 }
 
+/// A fix leaves a share of the error of the INS's velocity across the vehicle, which is its yaw's and the slip's; along
+/// it starts anew (F.17). P: of the velocity, after the fix. `begun`: what the error has in common with it, likewise.
+void leave_across(FusionEstimate& e, PoseBefore& begun, const Eigen::Matrix2d& P, const Eigen::Vector2d& across,
+                  double share) {
+  const Eigen::Vector2d along(across.y(), -across.x());
+  const Eigen::Matrix2d A = share * across * across.transpose();
+  const Eigen::Matrix2d own = A * e.P.block<2, 2>(kInsVelocity, kInsVelocity) * A;
+  e.x.segment<2>(kInsVelocity) = (A * e.x.segment<2>(kInsVelocity)).eval();
+  e.P.middleRows<2>(kInsVelocity) = A.lazyProduct(e.P.middleRows<2>(kInsVelocity)).eval();
+  e.P.middleCols<2>(kInsVelocity) = e.P.middleRows<2>(kInsVelocity).transpose();
+  e.P.block<2, 2>(kInsVelocity, kInsVelocity) = own + along.dot(P * along) * along * along.transpose() +
+                                                (1.0 - share) * across.dot(P * across) * across * across.transpose();
+  begun.with.middleRows<2>(kInsVelocity) = A.lazyProduct(begun.with.middleRows<2>(kInsVelocity)).eval();
+}
+
 }  // namespace
 
 /// Motion since the last use. A filter's corrections of its past are none: its velocities tell the motion without them.
@@ -63,12 +78,18 @@ Eigen::Vector2d Fusion::grown_velocity_variance(const Eigen::Matrix2d& P) const 
 }
 
 /// The errors of the INS velocity and of its gyro last while no fix corrects them: their variances grow as the INS
-/// says; where a fix did, the INS came to stand or was away, what was known of them is void.
+/// says. Where the INS came to stand, or was away, what was known of them is void; where a fix did, all but what lasts
+/// across the vehicle.
 void Fusion::follow_ins_errors(const Odometry& ins, double dt, bool was_away) {
   Memory& m = memory(FusionChannel::kIns);
   const Eigen::Matrix2d P = horizontal_velocity_covariance(ins);
   const double drift_variance = ins_drift_std_ * ins_drift_std_;
-  const bool redone = was_away || ins_corrected_ || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
+  const bool anew = was_away || !foreign_ || P.trace() < kStands * m.velocity_covariance.trace();
+  const bool redone = anew || ins_corrected_;
+  const bool lasts = !anew && distrust_ * distrust_ < P.trace();
+  const double yaw = now_.planar.pose.z();
+  const Eigen::Vector2d across(-std::sin(yaw), std::cos(yaw));
+  const double share = std::min(1.0, across.dot(P * across) / across.dot(m.velocity_covariance * across));
   const Eigen::Vector2d grown = grown_velocity_variance(P);
   const double drift_grown = std::max(0.0, drift_variance - m.drift_variance);
   distrust_ *= std::exp(-dt / kDistrustTime);
@@ -79,9 +100,14 @@ void Fusion::follow_ins_errors(const Odometry& ins, double dt, bool was_away) {
       e.P(kInsDrift, kInsDrift) += drift_grown;
       continue;
     }
-    for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::max(distrust_, std::sqrt(P(i, i))));
+    if (lasts) {
+      leave_across(e, begun_[k], P, across, share);
+    } else {
+      for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::max(distrust_, std::sqrt(P(i, i))));
+      begun_[k].with.middleRows<2>(kInsVelocity).setZero();
+    }
     set_independent(e, kInsDrift, 0.0, ins_drift_std_);
-    begun_[k].with.middleRows<3>(kInsVelocity).setZero();
+    begun_[k].with.row(kInsDrift).setZero();
   }
   if (redone) {
     m.velocity_covariance = P;

@@ -96,6 +96,56 @@ TEST_CASE("a gyro whose bias is known holds against a vision that turns away for
   CHECK(turned(kBias) < 0.8 * turned(0.0));
 }
 
+/// Shares of the INS's errors that the fusion has in its yaw, and that it knows of in the velocity across the vehicle,
+/// once the INS has turned off by 1.5e-3 rad in eight seconds with fixes that keep its place, and half says so.
+std::pair<double, double> turned_off(bool with_vision) {
+  constexpr double kBegin = 60.0, kLasts = 8.0, kOff = 1.5e-3, kClaimed = 0.5;
+  Tunnel t;
+  t.with_wheels = false;
+  t.ins.outages.clear();
+  t.ins.fix_period = 0.2;
+  t.ins.fix_sigma = 0.01;
+  t.ins.velocity_walk = 0.01;
+  t.ins.yaw_sigma = 2e-4;
+  t.ins.yaw_walk = 1e-5;
+  t.vo.yaw_step = 1e-5;
+  t.vo.turns_std = 0.0;
+  std::vector<StreamEvent> events = t.events();
+  std::erase_if(events, [&](const StreamEvent& e) { return !with_vision && e.sample.channel == FusionChannel::kVo; });
+  for (StreamEvent& e : events) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us) - kBegin;
+    e.sample.turns_exact = e.sample.channel == FusionChannel::kVo;
+    if (e.sample.channel != FusionChannel::kIns || s < 0.0) continue;
+    Odometry& o = e.sample.odometry;
+    const double off = kOff * std::min(1.0, s / kLasts);
+    const Eigen::Quaterniond turn = quaternion({off, 0.0, 0.0});
+    o.T_frame_vehicle.q = turn * o.T_frame_vehicle.q;
+    o.velocity = turn.conjugate() * o.velocity;
+    if (s < kLasts) o.angular_rate.z() += kOff / kLasts;
+    o.cov_pose(5, 5) += std::pow(kClaimed * off, 2);
+    o.cov_velocity(1, 1) += std::pow(kClaimed * off * o.velocity.x(), 2);
+  }
+  Fusion fusion({});
+  double yaw = 0.0, across = 0.0;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    if (seconds(t.drive, e.sample.odometry.t_us) > kBegin + kLasts) return;
+    const Vector x = f.estimate().x;
+    yaw = -test::planar_error(t.drive, f.fused()).error.z() / kOff;
+    across = (std::sin(x(kYaw)) * x(kInsVelocity) - std::cos(x(kYaw)) * x(kInsVelocity + 1)) / (kOff * x(kSpeed));
+  });
+  return {yaw, across};
+}
+
+TEST_CASE("an INS that turns off beside its fixes takes nobody with it whom vision tells") {
+  const auto seen = turned_off(true), blind = turned_off(false);
+  INFO("yaw " << seen.first << ", across " << seen.second << "; without vision " << blind.first << ", "
+              << blind.second);
+  CHECK(seen.first < 0.35);
+  CHECK(seen.second > 0.4);
+  CHECK(blind.first > 0.9);  // teeth
+  CHECK(std::abs(blind.second) < 0.1);
+}
+
 TEST_CASE("an INS that comes back with a velocity it does not know is not carried forward as one that does") {
   // In the tunnel, with vision, so that the fusion's place is its own; ahead of it 0.2 s of an INS that bridged a gap.
   const Tunnel t;
