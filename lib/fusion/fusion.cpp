@@ -200,6 +200,8 @@ void Fusion::place(const Odometry& o) {
   height_variance_ = o.cov_pose(2, 2);
   height_us_ = t_us_;
   tie_.forget();
+  comeback_.residual.setZero();  // no pose in enu was told yet that could jump
+  comeback_.height = 0.0;
   placed_ = true;
   foreign_ = false;
 }

@@ -63,6 +63,32 @@ TEST_CASE("alone, the INS's height is what the fusion gives, however little the 
   CHECK(off(true) > 1e-4);  // teeth: there only what it gained is taken
 }
 
+/// Distance (m) of the fused pose from the INS's first one, after two pictures of a vision that begins at speed and
+/// does not know that at its first picture: `sigma` (m/s), what it says.
+double off_at_first_fix(double sigma) {
+  constexpr double kVision = 20.0, kIns = 20.15;
+  Tunnel t;
+  t.with_wheels = false;
+  std::vector<StreamEvent> events = t.events();
+  std::erase_if(events, [&](const StreamEvent& e) {
+    const double s = seconds(t.drive, e.sample.odometry.t_us);
+    return s < (e.sample.channel == FusionChannel::kIns ? kIns : kVision);
+  });
+  Odometry& first = events.front().sample.odometry;
+  REQUIRE(first.velocity.x() > 5.0);
+  first.velocity.setZero();
+  first.cov_velocity = sigma * sigma * Eigen::Matrix3d::Identity();
+  Fusion fusion({});
+  std::optional<double> off;
+  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+    if (off || e.sample.channel != FusionChannel::kIns) return;
+    off = (f.fused().T_frame_vehicle.p - e.sample.odometry.T_frame_vehicle.p).norm();
+  });
+  return off.value();
+}
+
+TEST_CASE("the first pose in enu has nothing to make up") { CHECK(off_at_first_fix(30.0) < 0.01); }
+
 TEST_CASE("a gyro whose bias is known holds against a vision that turns away for some seconds") {
   // The INS says of its yaw what its gyro's bias adds up to. Taken for independent steps, that is worth less than the
   // vision's yaw in each step; known to last, it is worth more. After 25 s this bias turns the INS by 1.3e-3 rad, this
