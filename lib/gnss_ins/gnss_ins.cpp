@@ -141,6 +141,7 @@ void GnssIns::align_again() {
   agreed_since_us_ = 0;
   jump_ = JumpJudge();
   wheel_doubt_ = WheelDoubt();
+  imu_doubt_ = ImuDoubt();
   forward_stale_ = true;
   lag_us_ = lag_of(prior_age(config_.vehicle));
 }

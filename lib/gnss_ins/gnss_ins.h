@@ -15,6 +15,7 @@
 #include "gnss_ins/error_correlation.h"
 #include "gnss_ins/gnss_screen.h"
 #include "gnss_ins/heading_bank.h"
+#include "gnss_ins/imu_doubt.h"
 #include "gnss_ins/imu_ring.h"
 #include "gnss_ins/jump_judge.h"
 #include "gnss_ins/wheel_doubt.h"
@@ -89,6 +90,9 @@ class GnssIns {
   void use(const Pending& p);
   void use_position(const Pending& measured);
   void ask_wheels(const Pending& velocity, const AidingRecord& r);
+  [[nodiscard]] Eigen::Vector3d contradiction(int64_t t_us, const Eigen::Vector3d& place,
+                                              const Eigen::Vector3d& velocity);
+  void doubt_imu(const Pending& p, const Eigen::Vector3d& off);
   void show_anew(const Pending& p);
   void begin_return(const Pending& p);
   void weigh_by_itself(const Pending& measured, NoiseScale& noise);
@@ -142,6 +146,9 @@ class GnssIns {
   Geodetic last_fix_;
   int64_t told_us_ = 0;  // the last fix with a velocity: its stamp, place and velocity
   Eigen::Vector3d told_place_ = Eigen::Vector3d::Zero(), told_velocity_ = Eigen::Vector3d::Zero();
+  int64_t told_since_us_ = 0;                                // since when each fix had one,
+  Eigen::Vector3d contradiction_ = Eigen::Vector3d::Zero();  // and what they add up to besides the positions
+  ImuDoubt imu_doubt_;
   std::optional<double> wheel_speed_;
   std::array<int64_t, kAidingSources> used_at_us_{};
   int64_t refused_since_us_ = 0;

@@ -10,6 +10,7 @@ namespace roadfix {
 
 namespace {
 
+constexpr double kTellsOn = 1.5;     // s between two velocities, at most, whose way is known
 constexpr double kFixSpacing = 0.5;  // s, at least, between the two fixes that a start takes a velocity from
 
 }  // namespace
@@ -44,16 +45,18 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
   p.fix_type = fix.fix_type;
   p.value = enu_->enu(fix.antenna);
   p.cov = floored(fix.cov_enu, a.position_floor);
+  const bool tells = fix.velocity && a.use_gnss_velocity;
+  Eigen::Vector3d since_last = Eigen::Vector3d::Zero();
+  if (tells) {
+    since_last = contradiction(fix.t_us, p.value, to_enu * fix.velocity->enu);
+    p.contradiction = contradiction_;
+    p.told_since_us = told_since_us_;
+  }
   pending_.push(p);
-  if (fix.velocity && a.use_gnss_velocity) {
-    const Eigen::Vector3d place = p.value;
+  if (tells) {
     p.kind = PendingKind::kVelocity;
-    p.value = to_enu * fix.velocity->enu;
-    const double dt = seconds_between(told_us_, fix.t_us);
-    p.contradiction = place - told_place_ - 0.5 * dt * (told_velocity_ + p.value);
-    told_us_ = fix.t_us;
-    told_place_ = place;
-    told_velocity_ = p.value;
+    p.value = told_velocity_;
+    p.contradiction = since_last;
     const bool given = fix.velocity->cov_enu.diagonal().minCoeff() > 0.0;
     p.cov = floored(fix.velocity->cov_enu, given ? a.velocity_floor : a.velocity_default);
     pending_.push(p);
@@ -67,6 +70,22 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
     p.cov = sigma * sigma * Eigen::Matrix3d::Identity();
     pending_.push(p);
   }
+}
+
+/// m, by which the receiver has gone further since its last fix than its velocities; adds it up while these come.
+Eigen::Vector3d GnssIns::contradiction(int64_t t_us, const Eigen::Vector3d& place, const Eigen::Vector3d& velocity) {
+  const double dt = seconds_between(told_us_, t_us);
+  const Eigen::Vector3d since_last = place - told_place_ - 0.5 * dt * (told_velocity_ + velocity);
+  if (told_us_ == 0 || dt > kTellsOn) {
+    told_since_us_ = t_us;
+    contradiction_.setZero();
+  } else {
+    contradiction_ += since_last;
+  }
+  told_us_ = t_us;
+  told_place_ = place;
+  told_velocity_ = velocity;
+  return since_last;
 }
 
 void GnssIns::remember(const GnssFix& fix) {

@@ -11,7 +11,12 @@ namespace {
 constexpr double kMoving = 1.0;          // m/s
 constexpr double kRecoveryHolds = 60.0;  // s; refused again within, the attitude is wrong as well
 constexpr double kConfirmed = 1.0;       // s since another source last agreed with the filter's velocity
-constexpr double kOutage = 3.0;          // s without a position, after which a receiver may come back displaced
+// rad2, what an attitude may be wrong by where fixes are refused: 0.6 degrees of tilt and 3 of heading, which shows
+// late.
+const Eigen::Vector3d kTurnedAway(1e-4, 1e-4, 3e-3);
+constexpr double kUnnoticed = 3.0;  // s, that a bias acts until fixes of centimetres are refused for it
+constexpr double kGravity = 9.8;    // m/s2
+constexpr double kOutage = 3.0;     // s without a position, after which a receiver may come back displaced
 // Correlation time of the errors of fixes without a fixed carrier phase, until they have shown theirs: multipath and
 // code smoothing last seconds to a minute (Misra and Enge, Global Positioning System, 2006, ch. 5).
 constexpr double kCodeAlike = 5.0;  // s
@@ -42,8 +47,11 @@ void GnssIns::use(const Pending& measured) {
     note(r, p.id);
   } else {
     const AidingRecord r = applier_.apply(*core_, p, gates_);
-    if (p.kind == PendingKind::kWheels && r.status == AidingStatus::kAccepted)
-      wheel_doubt_.wheels((1.0 + core_->state().wheel_scale) * r.innovation[0]);
+    if (p.kind == PendingKind::kWheels) {
+      const double excess = (1.0 + core_->state().wheel_scale) * r.innovation[0];
+      if (r.status == AidingStatus::kAccepted) wheel_doubt_.wheels(excess);
+      if (r.dof > 0) imu_doubt_.wheels(p.t_us, excess);
+    }
     note(r, p.id);
   }
 }
@@ -54,9 +62,10 @@ void GnssIns::ask_wheels(const Pending& velocity, const AidingRecord& r) {
   const NavState& x = core_->state();
   const Eigen::Vector3d along = x.q_enu_imu * x.R_imu_vehicle().col(0);
   const double speed = along.dot(x.velocity), noise = config_.vehicle.wheel_noise;
+  const Eigen::Vector3d excess = Eigen::Map<const Eigen::Vector3d>(r.innovation.data());
+  imu_doubt_.receiver(velocity.t_us, excess, velocity.cov, along, noise * noise, config_.aiding.gate_sigma);
   const auto doubt =
-      wheel_doubt_.receiver({velocity.t_us, speed, along.dot(Eigen::Map<const Eigen::Vector3d>(r.innovation.data())),
-                             along.dot(velocity.cov * along), noise * noise,
+      wheel_doubt_.receiver({velocity.t_us, speed, along.dot(excess), along.dot(velocity.cov * along), noise * noise,
                              core_->last_covariance()(kWheelScale, kWheelScale), along.dot(velocity.contradiction)},
                             config_.aiding.gate_sigma);
   if (!doubt) return;
@@ -66,6 +75,21 @@ void GnssIns::ask_wheels(const Pending& velocity, const AidingRecord& r) {
   P(kWheelScale, kWheelScale) += doubt->share * doubt->share;
   P.block<3, 3>(kVel, kVel) += too_fast * too_fast.transpose();
   P.diagonal().segment<2>(kPos).array() += wrong * wrong;
+  core_->replace_covariance(P);
+}
+
+/// The biases may be any that the calibration knows of; what they did since a position agreed, and before it showed, is
+/// in velocity and attitude, (M.46).
+void GnssIns::doubt_imu(const Pending& p, const Eigen::Vector3d& off) {
+  const double gyro = config_.vehicle.gyro_bias_std, accel = config_.vehicle.accel_bias_std;
+  const double dt = kUnnoticed + imu_doubt_.since(p.t_us);
+  ErrorMatrix P = core_->covariance();
+  P.diagonal().segment<3>(kGyroBias).array() += gyro * gyro;
+  P.diagonal().segment<3>(kAccelBias).array() += accel * accel;
+  P.diagonal().segment<3>(kAtt) += kTurnedAway;
+  const double tilted = 0.5 * kGravity * gyro * dt;
+  P.diagonal().segment<3>(kVel).array() += (accel * accel + tilted * tilted) * dt * dt;
+  P.block<3, 3>(kPos, kPos) += off * off.transpose();
   core_->replace_covariance(P);
 }
 
@@ -100,6 +124,15 @@ void GnssIns::use_position(const Pending& measured) {
   const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
   const bool heading_holds = agrees_with(AidingSource::kGnssVelocity, p.t_us);
   const bool dragged = jump_.one_sided() && (heading_holds || agrees_with(AidingSource::kWheelSpeed, p.t_us));
+  if (r.status == AidingStatus::kAccepted) {
+    imu_doubt_.agreed(p);
+  } else if (r.status == AidingStatus::kGated && p.fix_type == FixType::kRtkFixed) {
+    const Eigen::Vector3d off = Eigen::Map<const Eigen::Vector3d>(r.innovation.data());
+    if (imu_doubt_.refused(p, off, config_.aiding.gate_sigma)) {
+      doubt_imu(p, off);
+      r = applier_.apply(*core_, p, gates_);
+    }
+  }
   if (!jumped && !dragged && !(doubted && r.status == AidingStatus::kAccepted)) quality.noise.learn(r);
   if (r.status == AidingStatus::kGated) {
     const AidingRecord level = applier_.apply_level(*core_, p, gates_);
@@ -176,7 +209,9 @@ void GnssIns::recover(const Pending& p) {
   P.middleCols<6>(kPos).setZero();
   P.diagonal().segment<3>(kPos).setConstant(1e4);
   P.diagonal().segment<3>(kVel).setConstant(4.0);
-  P.diagonal().segment<3>(kAtt) += Eigen::Vector3d(1e-4, 1e-4, 3e-3);
+  P.diagonal().segment<3>(kAtt) += kTurnedAway;
+  P.diagonal().segment<3>(kGyroBias).array() += config_.vehicle.gyro_bias_std * config_.vehicle.gyro_bias_std;
+  P.diagonal().segment<3>(kAccelBias).array() += config_.vehicle.accel_bias_std * config_.vehicle.accel_bias_std;
   core_->initialise(before, P);
   (void)applier_.apply(*core_, p, no_gates_);
   const NavState& after = core_->state();

@@ -22,8 +22,10 @@ struct Pending {
   WheelDirection direction = WheelDirection::kSigned;
   FixType fix_type = FixType::kNone;
   double alike = 1.0;  ///< as Measurement::alike, when it is used
-  /// Of a velocity: m, by which the receiver's positions have gone further since the last one than its velocities.
+  /// m, by which the receiver's positions have gone further than its velocities: of a velocity since the last one, of a
+  /// position since `told_since_us`; zero there: the fix has no velocity.
   Eigen::Vector3d contradiction = Eigen::Vector3d::Zero();
+  int64_t told_since_us = 0;
 
   /// s, age of the value at its stamp less the offset of the IMU's clock: how much earlier on the IMU's clock it was.
   [[nodiscard]] double age(const NavState& x) const {
@@ -45,7 +47,7 @@ struct Pending {
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(kind, t_us, id, value, cov, direction, fix_type, contradiction);
+    a(kind, t_us, id, value, cov, direction, fix_type, contradiction, told_since_us);
   }
 };
 

@@ -82,6 +82,26 @@ TEST_CASE("a receiver that is dragged off at half a metre a second is held again
   CHECK(followed.horizontal > 10.0);
 }
 
+namespace {
+
+constexpr const char* kShock =
+    "imu.bias@60+200:gyro_x_radps=0.002,gyro_y_radps=0.002,gyro_z_radps=0.002,"
+    "accel_x_mps2=0.1,accel_y_mps2=0.1,accel_z_mps2=0.1";
+
+}  // namespace
+
+TEST_CASE("an IMU whose biases step is doubted, and not the fixes that show it") {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    CAPTURE(seed);
+    check_held(drive_with(kShock, 120.0, seed), 0.5, 0.05);
+    check_held(drive_with(kShock, 120.0, seed, "wheels.silence@0+200"), 0.5, 0.05);
+  }
+  // Teeth, and what cannot be told: a receiver without a velocity may be dragged off, and is refused for long.
+  const Worst untold = drive_with(kShock, 120.0, 1, "gnss.no_velocity@0+200");
+  CHECK(untold.horizontal > 5.0);
+  CHECK(untold.resets >= 1);
+}
+
 TEST_CASE("wheels that slip by less than their gate do not lead away from fixed fixes") {
   for (const double ratio : {0.005, 0.01, 0.02, 0.03}) {
     char fault[64];
