@@ -60,6 +60,8 @@ Sight sight(const BundleProblem& problem, const Eyes& eyes, const BundleProblem:
   Sight s;
   Eigen::Vector2d seen;
   s.visible = eyes.of(o).see(problem.points[static_cast<size_t>(o.point)], seen, &s.J);
+  const BundleProblem::View& view = problem.views[static_cast<size_t>(o.view)];
+  if (view.fixed && s.visible) s.J.correction += s.J.pose * view.pull;
   s.residual = scale * (o.normalised - seen);
   s.r2 = s.residual.squaredNorm();
   s.J.pose *= scale;
@@ -142,9 +144,12 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
 
 void apply(const NormalEquations::Step& step, const std::vector<int>& free, BundleProblem& problem) {
   for (size_t v = 0; v < problem.views.size(); ++v) {
-    if (free[v] < 0) continue;
     SE3& T = problem.views[v].T_map_camera;
-    T = retract(T, step.views.segment<6>(6 * free[v]));
+    if (free[v] >= 0) {
+      T = retract(T, step.views.segment<6>(6 * free[v]));
+    } else if (!problem.views[v].pull.isZero(0.0)) {
+      T = retract(T, problem.views[v].pull * step.lens);
+    }
   }
   for (size_t p = 0; p < step.points.size(); ++p) problem.points[p] += step.points[p];
   problem.lens.value += step.lens;
@@ -190,6 +195,12 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
     report.clustered_cov_last = end.equations.clustered_covariance(cov).block<6, 6>(row, row);
   }
   report.lens_cov = cov.bottomRightCorner<LensCorrection::kSize, LensCorrection::kSize>();
+  const LensCorrection::Matrix lens_information = report.lens_cov.inverse();
+  for (size_t v = 0; v < problem.views.size(); ++v) {
+    report.pulls.push_back(free[v] < 0
+                               ? problem.views[v].pull
+                               : cov.block<6, LensCorrection::kSize>(6 * free[v], 6 * num_free) * lens_information);
+  }
   return report;
 }
 

@@ -12,10 +12,14 @@
 
 namespace roadfix {
 
+/// How a pose moves, by retract(), where the lens is found to be another.
+using LensPull = Eigen::Matrix<double, 6, LensCorrection::kSize>;
+
 struct BundleProblem {
   struct View {
     SE3 T_map_camera;
-    bool fixed = false;
+    bool fixed = false;                ///< but for what it moves with the lens
+    LensPull pull = LensPull::Zero();  ///< of a fixed view, (M.13c)
   };
   struct Observation {
     int view = 0;
@@ -53,6 +57,7 @@ struct BundleReport {
   std::vector<double> error_px;          ///< one per observation, after; infinite where the point is not in front
   Matrix6d cov_last = Matrix6d::Zero();  ///< of the last view against the fixed ones, every error on its own
   Matrix6d clustered_cov_last = Matrix6d::Zero();  ///< the same for errors that are alike along a track, (M.16)
+  std::vector<LensPull> pulls;                     ///< one per view, against the fixed ones
   LensCorrection::Matrix lens_cov = LensCorrection::Matrix::Zero();
 };
 

@@ -173,7 +173,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
     seen.push_back({all[i].track, *normalised, {}});
     if (right[i]) seen.back().right = right_lens.unproject(right[i]->cast<double>());
   }
-  const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}};
+  const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}, LensPull::Zero()};
   if (!map_.empty()) {
     const SE3& T_map_before = map_.last().T_map_camera;
     const SE3 T_before_now = T_map_before.inverse() * T_map_camera_;

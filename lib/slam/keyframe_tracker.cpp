@@ -237,11 +237,12 @@ void KeyframeTracker::settle(int64_t t_us, const SE3& T_map_camera, const Matrix
   }
 }
 
-/// What lengths and turns are known to, all along the way.
+/// What lengths and turns are known to, all along the way. One eye learns its focal length, (M.15).
 SharedDoubt KeyframeTracker::shared_doubt() const {
   if (stereo_ && !map_.one_eyed()) return rig_.doubt;
-  if (stereo_) return {std::max(rig_.doubt.lengths, scale_std_), rig_.doubt.turns};
-  return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, 0.0};  // mono's focal length is learnt
+  const double turns = map_.focal_std();
+  if (stereo_) return {std::max(rig_.doubt.lengths, scale_std_), std::max(rig_.doubt.turns, turns)};
+  return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, turns};
 }
 
 /// A pose and its covariances: what the map knows, carried here, what this picture adds, `cov_camera`, and what the

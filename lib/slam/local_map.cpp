@@ -1,8 +1,10 @@
 #include "slam/local_map.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/frames.h"
+#include "slam/pose_covariance.h"
 #include "slam/reprojection.h"
 #include "slam/state_io.h"
 #include "slam/triangulation.h"
@@ -10,7 +12,8 @@
 namespace roadfix {
 namespace {
 
-constexpr int64_t kBlink = 3;  ///< keyframes without the right eye that are no loss of it
+constexpr double kNoLoss = 0.99;  ///< share of what is known of the lens that a window may not take away
+constexpr int64_t kBlink = 3;     ///< keyframes without the right eye that are no loss of it
 
 /// Of the calibration before any picture. Two eyes tell depth by disparity, which every error of a lens resembles:
 /// there only the right eye's turn is learnt.
@@ -123,6 +126,17 @@ size_t LocalMap::num_fixed() const {
   return keyframes_.size() > window + 1 ? keyframes_.size() - window : 1;
 }
 
+/// What is held was adjusted with the lens of then, and moves with it: all but the newest view held. And a sighting is
+/// in as many windows as there are keyframes: beside all of them what is known must not drown. (M.13c), (M.15).
+void LocalMap::free_lens(BundleProblem& problem, size_t fixed) const {
+  const Keyframe& newest = keyframes_[fixed - 1];
+  for (size_t i = 0; i < fixed; ++i) {
+    const SE3 T_newest_held = newest.T_map_camera.inverse() * keyframes_[i].T_map_camera;
+    problem.views[i].pull = keyframes_[i].pull - carried_by(newest.T_map_camera, T_newest_held) * newest.pull;
+  }
+  problem.lens_information *= static_cast<double>(keyframes_.size());
+}
+
 BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
   BundleJob job;
   BundleProblem& problem = job.problem;
@@ -147,6 +161,10 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
       problem.distances.push_back({view - 1, view, *k.held_distance, kUnitHold * *k.held_distance});
     }
   }
+  const bool two_eyes = rig_.right && !one_eyed_;
+  const bool measured = std::any_of(problem.distances.begin(), problem.distances.end(),
+                                    [](const BundleProblem::Distance& d) { return d.measured; });
+  if (!two_eyes && measured) free_lens(problem, fixed);
   const int64_t first = keyframes_.front().id, first_free = first + static_cast<int64_t>(fixed);
   for (const auto& [track, landmark] : landmarks_) {
     const std::vector<Sighting>& seen = landmark.sightings;
@@ -167,7 +185,9 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
 std::vector<int64_t> LocalMap::apply(const BundleJob& job) {
   for (size_t i = 0; i < job.keyframes.size(); ++i) {
     for (Keyframe& k : keyframes_) {
-      if (k.id == job.keyframes[i]) k.T_map_camera = job.problem.views[i].T_map_camera;
+      if (k.id != job.keyframes[i]) continue;
+      k.T_map_camera = job.problem.views[i].T_map_camera;
+      k.pull = job.report.pulls[i];
     }
   }
   for (size_t i = 0; i < job.tracks.size(); ++i) {
@@ -190,8 +210,18 @@ void LocalMap::learn_lens(const BundleJob& job) {
   lens_ = lens_prior_ = job.problem.lens;
   // What this window added. The next windows share most of it: each counts for its share only, (M.15).
   const double share = 1.0 / static_cast<double>(job.keyframes.size());
-  const LensCorrection::Matrix added = job.report.lens_cov.inverse() - job.problem.lens_information;
-  if (added.allFinite()) lens_information_ += share * 0.5 * (added + added.transpose());
+  const LensCorrection::Matrix told = job.report.lens_cov.inverse() - job.problem.lens_information;
+  const LensCorrection::Matrix added = share * 0.5 * (told + told.transpose());
+  // Where a window has not come to its minimum its curvature may be none, and it tells nothing.
+  const LensCorrection::Matrix sum = lens_information_ + added;
+  const bool grows = Eigen::LLT<LensCorrection::Matrix>(sum - kNoLoss * lens_information_).info() == Eigen::Success;
+  if (added.allFinite() && grows) lens_information_ = sum;
+}
+
+double LocalMap::focal_std() const {
+  constexpr int kFocal = LensCorrection::kFocal;
+  const LensCorrection::Matrix cov = config_.alike_sightings * lens_information_.inverse();
+  return std::sqrt(cov(kFocal, kFocal));
 }
 
 void LocalMap::forget(std::span<const int64_t> tracks) {
@@ -203,6 +233,7 @@ void LocalMap::rescale(double factor) {
   for (Keyframe& k : keyframes_) {
     k.T_map_camera.p = centre + factor * (k.T_map_camera.p - centre);
     if (k.held_distance) k.held_distance = factor * *k.held_distance;
+    k.pull.topRows<3>() *= factor;
   }
   for (auto& [track, landmark] : landmarks_) {
     if (landmark.p_map) landmark.p_map = centre + factor * (*landmark.p_map - centre);
@@ -210,7 +241,10 @@ void LocalMap::rescale(double factor) {
 }
 
 void LocalMap::move(const SE3& T) {
-  for (Keyframe& k : keyframes_) k.T_map_camera = T * k.T_map_camera;
+  for (Keyframe& k : keyframes_) {
+    k.T_map_camera = T * k.T_map_camera;
+    k.pull.topRows<3>() = (T.R() * k.pull.topRows<3>()).eval();
+  }
   for (auto& [track, landmark] : landmarks_) {
     if (landmark.p_map) landmark.p_map = T * *landmark.p_map;
   }

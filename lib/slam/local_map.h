@@ -41,10 +41,11 @@ struct Keyframe {
   int64_t t_us = 0;
   SE3 T_map_camera;                     ///< of the left eye
   std::optional<double> held_distance;  ///< to the keyframe before: a unit of length, where nothing else gives one
+  LensPull pull = LensPull::Zero();     ///< against the keyframes that were held when it was last adjusted
 
   template <class Self, class Archive>
   static void members(Self& self, Archive& archive) {
-    archive(self.id, self.t_us, self.T_map_camera, self.held_distance);
+    archive(self.id, self.t_us, self.T_map_camera, self.held_distance, self.pull);
   }
 };
 
@@ -97,6 +98,8 @@ class LocalMap {
   [[nodiscard]] const std::map<int64_t, Landmark>& landmarks() const { return landmarks_; }
   [[nodiscard]] const Landmark* find(int64_t track) const;
   [[nodiscard]] const LensCorrection& lens() const { return lens_; }
+  /// Relative, of the focal length that is learnt, (M.15).
+  [[nodiscard]] double focal_std() const;
   [[nodiscard]] int64_t num_keyframes_ever() const { return next_id_; }
   /// A rig of two eyes of which the right one has not been there for the last keyframes: a camera like mono's.
   [[nodiscard]] bool one_eyed() const { return one_eyed_; }
@@ -107,6 +110,7 @@ class LocalMap {
   void make_points();
   void count_eyes(std::span<const KeyframeFeature> features);
   void learn_lens(const BundleJob& job);
+  void free_lens(BundleProblem& problem, size_t fixed) const;
   void forget_old_keyframes();
   [[nodiscard]] const Keyframe* keyframe(int64_t id) const;
   [[nodiscard]] std::optional<Eigen::Vector3d> locate(const Landmark& landmark) const;

@@ -197,6 +197,70 @@ TEST_CASE("a wrong focal length and a turned right eye are found") {
   CHECK((s.problem.lens.value - truth.value).norm() < 1e-4);
 }
 
+/// One eye that turns, seen through a lens whose focal length is 2 % longer than told, with distances known.
+Scene turning_eye(unsigned seed) {
+  Scene s = make_scene(seed, false, 0.1, 0.0);
+  LensCorrection truth;
+  truth.value(LensCorrection::kFocal) = 0.02;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.1 / kFocal);
+  for (size_t v = 0; v < s.true_views.size(); ++v) {
+    s.true_views[v].q = exp_q({0.0, 0.06 * static_cast<double>(v), 0.0});
+    s.problem.views[v] = {s.true_views[v], v == 0};
+    if (v == 0) continue;
+    const double way = (s.true_views[v].p - s.true_views[v - 1].p).norm();
+    s.problem.distances.push_back({static_cast<int>(v) - 1, static_cast<int>(v), way, 0.005, true});
+  }
+  std::vector<BundleProblem::Observation> seen;
+  for (auto& o : s.problem.observations) {
+    const SE3& T = s.true_views[static_cast<size_t>(o.view)];
+    if (!Eye(T, truth).see(s.true_points[static_cast<size_t>(o.point)], o.normalised)) continue;
+    o.normalised += Eigen::Vector2d(noise(random), noise(random));
+    seen.push_back(o);
+  }
+  s.problem.observations = seen;
+  return s;
+}
+
+TEST_CASE("a pull is what the poses move by where the lens is told to be another") {
+  Scene s = turning_eye(3);
+  const BundleReport report = adjust(s.problem, 50);
+  BundleProblem other = s.problem;
+  constexpr double kStep = 1e-3;
+  other.lens.value(LensCorrection::kFocal) += kStep;
+  other.lens_prior = other.lens;
+  (void)adjust(other, 50);
+  for (size_t v = 1; v < s.problem.views.size(); ++v) {
+    const Vector6d moved = local(s.problem.views[v].T_map_camera, other.views[v].T_map_camera) / kStep;
+    const Vector6d pull = report.pulls[v].col(LensCorrection::kFocal);
+    CAPTURE(v, moved.transpose(), pull.transpose());
+    CHECK((moved - pull).norm() < 0.1 * pull.norm());
+    CHECK((moved + pull).norm() > pull.norm());  // teeth
+  }
+}
+
+TEST_CASE("views that are held do not hold the lens that they were adjusted with") {
+  const auto learnt = [](bool pulled) {
+    Scene s = turning_eye(4);
+    const BundleReport before = adjust(s.problem, 50);  // the lens believed
+    for (size_t v = 0; v < 4; ++v) {
+      s.problem.views[v].fixed = true;
+      if (pulled) s.problem.views[v].pull = before.pulls[v];
+    }
+    s.problem.lens_information = LensCorrection::Vector(1e2, 1e12, 1e12, 1e12, 1e12).asDiagonal();
+    const BundleReport after = adjust(s.problem, 50);
+    return std::pair(s.problem.lens.value(LensCorrection::kFocal) - 0.02,
+                     std::sqrt(after.lens_cov(LensCorrection::kFocal, LensCorrection::kFocal)));
+  };
+  const auto [error, sigma] = learnt(true);
+  const auto [error_held, sigma_held] = learnt(false);
+  CAPTURE(error, sigma, error_held, sigma_held);
+  CHECK(std::abs(error) < 0.004);
+  CHECK(std::abs(error) < 4.0 * sigma);
+  CHECK(std::abs(error_held) > 5.0 * sigma_held);  // teeth
+  CHECK(std::abs(error_held) > 2.0 * std::abs(error));
+}
+
 TEST_CASE("a distance between views gives mono its scale") {
   Scene s = make_scene(12, false, 0.1, 0.0);
   s.problem.views[1].fixed = false;

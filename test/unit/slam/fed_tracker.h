@@ -14,12 +14,16 @@ namespace roadfix::test {
 /// A tracker whose front end and right eye are fed by hand.
 class FedTracker {
  public:
-  FedTracker(const KeyframeTrackerConfig& config, const ScenarioConfig& scenario, bool stereo = true)
+  /// `focal_told`: the calibration's focal length over the true one.
+  FedTracker(const KeyframeTrackerConfig& config, const ScenarioConfig& scenario, bool stereo = true,
+             double focal_told = 1.0)
       : stereo_(stereo), picture_(scenario.camera.height_px, scenario.camera.width_px, CV_8UC1) {
     fix_eigen_blocking();
     for (int i = 0; i < static_cast<int>(picture_.total()); ++i) picture_.data[i] = static_cast<uint8_t>(i % 2 * 64);
     CameraRig rig;
     rig.left = intrinsics_of(scenario.camera);
+    rig.left.fx *= focal_told;
+    rig.left.fy *= focal_told;
     rig.T_vehicle_left = nominal_T_vehicle_left(scenario.camera);
     if (stereo) {
       rig.right = rig.left;
