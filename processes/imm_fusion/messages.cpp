@@ -112,7 +112,7 @@ CommonError common_error(const vo_status_t& m) {
   e.scale_std = m.scale_std;
   for (int i = 0; i < e.columns.rows(); ++i)
     for (int j = 0; j < e.columns.cols(); ++j) e.columns(i, j) = m.shared_error_m_rad[j][i];
-  // One eye believes the focal length that it has learnt: its zeros say nothing.
+  // One eye learns its focal length, exactly never: its zeros say that its map has not begun.
   e.turns_exact = m.scale_source == vo_status_t::SCALE_FROM_STEREO && e.columns.col(1).isZero(0.0);
   return e;
 }
