@@ -75,7 +75,7 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
 /// m, by which the receiver has gone further since its last fix than its velocities; adds it up while these come.
 Eigen::Vector3d GnssIns::contradiction(int64_t t_us, const Eigen::Vector3d& place, const Eigen::Vector3d& velocity) {
   const double dt = seconds_between(told_us_, t_us);
-  const Eigen::Vector3d since_last = place - told_place_ - 0.5 * dt * (told_velocity_ + velocity);
+  Eigen::Vector3d since_last = place - told_place_ - 0.5 * dt * (told_velocity_ + velocity);
   if (told_us_ == 0 || dt > kTellsOn) {
     told_since_us_ = t_us;
     contradiction_.setZero();
