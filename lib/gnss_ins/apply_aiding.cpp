@@ -48,6 +48,16 @@ Measurement<3> position_of(const InsCore& core, const Pending& p) {
   return m;
 }
 
+/// Receivers smooth their velocities, which in a turn looks like an antenna elsewhere: its place is doubt, and not
+/// learnt.
+Measurement<3> velocity_of(const InsCore& core, const Pending& p) {
+  Measurement<3> m = gnss_velocity(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()));
+  const Eigen::Matrix3d by_antenna = m.H.middleCols<3>(kAntenna);
+  m.R += by_antenna * core.last_covariance().block<3, 3>(kAntenna, kAntenna) * by_antenna.transpose();
+  m.H.middleCols<3>(kAntenna).setZero();
+  return m;
+}
+
 }  // namespace
 
 Gates::Gates(double sigma) {
@@ -67,8 +77,7 @@ AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& 
     case PendingKind::kPosition:
       return core.fuse(AidingSource::kGnssPosition, p.t_us, position_of(core, p), gates.nis[3]);
     case PendingKind::kVelocity:
-      return core.fuse(AidingSource::kGnssVelocity, p.t_us, gnss_velocity(x, core.motion(), p.value, p.cov, p.ahead(x)),
-                       gates.nis[3]);
+      return core.fuse(AidingSource::kGnssVelocity, p.t_us, velocity_of(core, p), gates.nis[3]);
     case PendingKind::kHeading:
       return core.fuse(AidingSource::kGnssHeading, p.t_us, vehicle_yaw(x, p.value.x(), std::sqrt(p.cov(0, 0))),
                        gates.nis[1]);

@@ -96,6 +96,7 @@ struct PropagationConfig {
   double time_offset_walk = 5.0e-3;   ///< s/sqrt(s), of the IMU's stamps, where time_offset_std is not zero
   double wheel_scale_walk = 1.3e-5;   ///< 1/sqrt(s): over a minute, what a tyre grows that warms up (MODEL.md)
   double mounting_walk = 1.0e-5;      ///< rad/sqrt(s)
+  double antenna_walk = 4.0e-3;       ///< m/sqrt(s), what the IMU's cross axes and its mount make of turns
 };
 
 /// What a fix must say about itself.
@@ -187,6 +188,7 @@ void visit(PropagationConfig& c, Visitor& v) {
   v.number("time_offset_walk_s_per_rts", c.time_offset_walk, 0.0, 1.0);
   v.number("wheel_scale_walk_per_rts", c.wheel_scale_walk, 0.0, 1.0);
   v.number("mounting_walk_rad_per_rts", c.mounting_walk, 0.0, 1.0);
+  v.number("antenna_walk_m_per_rts", c.antenna_walk, 0.0, 1.0);
 }
 
 template <class Visitor>

@@ -76,6 +76,8 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
   if (v.wheel_scale_std > 0.0) noise(kWheelScale) = p.wheel_scale_walk * p.wheel_scale_walk * s.duration;
   for (int i = 0; i < 2; ++i)
     if (v.mounting_std(1 + i) > 0.0) noise(kMounting + i) = p.mounting_walk * p.mounting_walk * s.duration;
+  for (int i = 0; i < 3; ++i)
+    if (v.p_imu_antenna_std(i) > 0.0) noise(kAntenna + i) = p.antenna_walk * p.antenna_walk * s.duration;
   // The IMU's clock drifts against the receiver's; where the IMU defines time, the fixes do.
   const TimePriors time(v);
   const double walk = p.time_offset_walk * p.time_offset_walk * s.duration;
