@@ -5,6 +5,7 @@
 #include "config/config.h"
 #include "geometry/euler.h"
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 
 namespace roadfix {
 namespace {
@@ -153,6 +154,10 @@ Eigen::Vector3d Calibration::forward_in_body() const {
   if (!mounting || !mounting->angles_deg) return Eigen::Vector3d::UnitX();
   const Eigen::Vector3d angles = kDegree * *mounting->angles_deg;
   return quaternion({angles.z(), angles.y(), angles.x()}).conjugate() * Eigen::Vector3d::UnitX();
+}
+
+Eigen::Vector2d Calibration::turn_to_forward() const {
+  return log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward_in_body())).tail<2>();
 }
 
 PlaceOnVehicle Calibration::rear_axle() const {

@@ -121,6 +121,10 @@ struct Calibration {
   /// Where the vehicle's x axis points in body axes, as far as that is known.
   [[nodiscard]] Eigen::Vector3d forward_in_body() const;
 
+  /// The shortest turn from body's x axis there, about body's y and z axes, rad; the roll of the mounting does not
+  /// show.
+  [[nodiscard]] Eigen::Vector2d turn_to_forward() const;
+
   /// The rear axle's centre: measured where wheels.lever_arm_body_m tells it; nought where the body's origin is the
   /// axle; else unknown.
   [[nodiscard]] PlaceOnVehicle rear_axle() const;

@@ -10,7 +10,6 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
-#include "geometry/so3.h"
 #include "gnss_ins/gnss_ins.h"
 #include "gnss_ins_ekf/messages.h"
 #include "stream/state_bytes.h"
@@ -186,9 +185,7 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;
     take_known(mag->soft_iron, v.soft_iron);
   }
-  // The shortest turn from the imu's x axis to the vehicle's: roll does not show.
-  const Eigen::Vector3d forward = calibration.forward_in_body();
-  v.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward)).tail<2>();
+  v.mounting = calibration.turn_to_forward();
   if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
   return v;
 }

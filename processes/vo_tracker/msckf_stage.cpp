@@ -13,7 +13,6 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "geometry/frames.h"
-#include "geometry/so3.h"
 #include "vo_tracker/camera_rig.h"
 #include "vo_tracker/messages.h"
 #include "vo_tracker/picture.h"
@@ -78,9 +77,7 @@ MsckfVehicle msckf_vehicle(const Calibration& calibration) {
   }
   if (calibration.mounting && calibration.mounting->std_deg)
     v.mounting_std = calibration.mounting->std_deg->tail<2>().maxCoeff() * kDegree;
-  // The shortest turn from the imu's x axis to the vehicle's: roll does not show.
-  const Eigen::Vector3d forward = calibration.forward_in_body();
-  v.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward)).tail<2>();
+  v.mounting = calibration.turn_to_forward();
   return v;
 }
 

@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/config_error.h"
+#include "geometry/so3.h"
 
 namespace roadfix {
 namespace {
@@ -49,6 +50,8 @@ TEST_CASE("a full calibration is read and written without loss") {
   CHECK(c.mounting->std_deg->z() == 3.0);
   // Turned to the right by 30 degrees, the imu sees the car go to its left.
   CHECK(c.forward_in_body().y() > 0.45);
+  CHECK((exp_so3(Eigen::Vector3d(0.0, c.turn_to_forward()[0], c.turn_to_forward()[1])).col(0) - c.forward_in_body())
+            .norm() < 1e-12);
   const std::string text = calibration_text(c);
   CHECK(calibration_text(parse_calibration(text, "again")) == text);
 }
