@@ -40,6 +40,8 @@ echo "units verified"
 
 mkdir -p "$folder"/bin "$folder"/vehicle "$folder"/copies
 cp configs/demo/calibration.yaml "$folder/vehicle"
+echo 'threads: 1' >"$folder/vehicle/vo_tracker.yaml"
+echo weights >"$folder/vehicle/superpoint.onnx"
 cat >"$folder/vehicle/run.yaml" <<'YAML'
 processes:
   - {name: recorder, realtime_priority: 40, arguments: [--folder, "a b%"]}
@@ -72,7 +74,15 @@ done
 id roadfix >/dev/null || fail "there is no user"
 grep -qF -- '--realtime 40 "--folder" "a b%%"' "$units/roadfix@recorder.service.d/run.conf" || fail "priority and arguments are lost"
 grep -q '^LimitRTPRIO=40$' "$units/roadfix@recorder.service.d/run.conf" || fail "the priority is not allowed"
+vehicle=/etc/roadfix/vehicle
+cmp "$folder/vehicle/superpoint.onnx" $vehicle/superpoint.onnx || fail "the vehicle's folder is not whole"
+echo 'threads: 2' >$vehicle/vo_tracker.yaml
+rm "$folder/vehicle/vo_tracker.yaml"
 scripts/install-services "$folder/vehicle" watch || fail "status $? the second time"
+[[ ! -e $vehicle/vo_tracker.yaml ]] || fail "the other vehicle's configuration is still there"
+grep -q 2 $vehicle.before/vo_tracker.yaml || fail "what was edited there is lost"
+scripts/install-services $vehicle watch || fail "status $? from the installed folder"
+[[ -f $vehicle/superpoint.onnx && -f $vehicle.before/vo_tracker.yaml ]] || fail "the installed folder was taken away from itself"
 [[ -L $units/roadfix.target.wants/roadfix@watch.service && ! -e $units/roadfix.target.wants/roadfix@recorder.service ]] ||
   fail "the other vehicle's recorder is still enabled"
 ROOT
