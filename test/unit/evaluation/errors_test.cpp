@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "evaluation/drift.h"
+#include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "unit/evaluation/synthetic.h"
 
@@ -40,6 +41,19 @@ TEST_CASE("a turned vehicle shows as roll, pitch and yaw alone") {
   CHECK(axes.roll->rms == Approx(0.5 * kDegree));
   CHECK(axes.yaw->rms == Approx(0.0).margin(1e-12));
   CHECK(axes.norm.max == 0.0);
+}
+
+TEST_CASE("errors of roll, pitch and yaw are differences of the angles, on a slope too") {
+  const auto sloping = [](double more) {
+    return changed(kReference, [&](Odometry& pose) {
+      const double yaw = yaw_pitch_roll(pose.T_frame_vehicle.q).yaw;
+      pose.T_frame_vehicle.q = quaternion({yaw + more, 0.05 + 2.0 * more, -0.03 + 3.0 * more});
+    });
+  };
+  const AxisErrors axes = axis_errors(pose_errors(associate(sloping(0.002), sloping(0.0), false), {}), {});
+  CHECK(axes.yaw->mean == Approx(0.002));
+  CHECK(axes.pitch->mean == Approx(0.004));
+  CHECK(axes.roll->mean == Approx(0.006));
 }
 
 TEST_CASE("yaw errors do not wrap") {

@@ -171,6 +171,8 @@ TEST_CASE("a constant latency of the reference is found where it is asked for") 
   const ChannelScore report = evaluate_channel(reference, facts, estimate, options);
   CHECK(report.delay_s == Approx(0.43).margin(2e-4));
   CHECK(report.ate_rmse < 5e-3);
+  const PathPoint& second = report.path.at(1);  // of the report's map: in the reference's time
+  CHECK((second.p - test::eight(1e-6 * static_cast<double>(second.t_us) - 0.43).T_frame_vehicle.p).norm() < 1e-2);
 }
 
 TEST_CASE("availability tells valid, coasting, invalid and silent") {

@@ -50,6 +50,15 @@ TEST_CASE("always saying straight scores high plainly and half when balanced") {
   CHECK(accuracy.balanced_percent == Approx(50.0));
 }
 
+TEST_CASE("a drive without a turn is balanced by itself") {
+  Trajectory straight = with_one_turn();
+  std::erase_if(straight.poses, [](const Odometry& pose) { return pose.t_us > 39'000'000; });
+  const ModeAccuracy accuracy = mode_accuracy(says(0.0, 9.75), straight, 3.0 * kDegree).value();
+  CHECK(accuracy.turns == 0);
+  CHECK(accuracy.percent == Approx(75.0).margin(0.5));
+  CHECK(accuracy.balanced_percent == accuracy.percent);
+}
+
 TEST_CASE("a late turn costs what it is late") {
   const ModeAccuracy accuracy = mode_accuracy(says(41.5, 56.5), with_one_turn(), 3.0 * kDegree).value();
   CHECK(accuracy.percent == Approx(97.0).margin(0.3));

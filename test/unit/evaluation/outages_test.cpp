@@ -28,6 +28,13 @@ std::vector<PoseError> errors_of(const Trajectory& estimate) {
   return pose_errors(associate(estimate, kReference, false), {});
 }
 
+double path_length(double begin_s, double end_s) {
+  double length = 0.0;
+  for (double t_s = begin_s; t_s < end_s; t_s += 0.01)
+    length += 0.01 * test::eight(t_s + 0.005).velocity.head<2>().norm();
+  return length;
+}
+
 TEST_CASE("the error of an outage is the one at its last withheld fix") {
   const OutageErrors errors =
       outage_errors(drifting(0.1, 0.0), kReference, kOutages, errors_of(drifting(0.1, 0.0)), {});
@@ -37,6 +44,8 @@ TEST_CASE("the error of an outage is the one at its last withheld fix") {
   CHECK(errors.each[0].vertical_m == Approx(0.0).margin(1e-12));
   CHECK(errors.each[0].duration_s == Approx(30.0));
   CHECK(errors.each[0].yaw_rad.value() == Approx(0.0).margin(1e-12));
+  CHECK(errors.mean_distance_m == Approx(0.5 * (errors.each[0].distance_m + errors.each[1].distance_m)));
+  CHECK(errors.each[0].distance_m == Approx(path_length(60.0, 90.0)).epsilon(1e-3));
   CHECK(errors.rms_percent > 0.8 * 100.0 * 3.0 / errors.mean_distance_m);
   CHECK(errors.missing == 0);
 }

@@ -34,6 +34,25 @@ TEST_CASE("interpolated attitude follows the geodesic") {
   CHECK(log_q(pose.value().T_frame_vehicle.q.conjugate() * eight(1.15).T_frame_vehicle.q).norm() < 1e-5);
 }
 
+TEST_CASE("what is interpolated between two poses is theirs by their nearness") {
+  Trajectory two = eight_trajectory(0.0, 1.0, 1.0);
+  two.poses[0].velocity = {2.0, -4.0, 1.0};
+  two.poses[1].velocity = {6.0, 4.0, 1.0};
+  two.poses[0].angular_rate = {0.0, 0.1, 0.3};
+  two.poses[1].angular_rate = {0.4, 0.1, -0.1};
+  two.poses[0].cov_pose.setIdentity();
+  two.poses[1].cov_pose = 5.0 * two.poses[0].cov_pose;
+  two.poses[0].cov_velocity.setIdentity();
+  two.poses[1].cov_velocity = 9.0 * two.poses[0].cov_velocity;
+  two.poses[1].validity = Validity::kCoasting;
+  const Odometry pose = interpolate(two, 250'000, 2'000'000).value();
+  CHECK(pose.velocity.isApprox(Eigen::Vector3d(3.0, -2.0, 1.0)));
+  CHECK(pose.angular_rate.isApprox(Eigen::Vector3d(0.1, 0.1, 0.2)));
+  CHECK(pose.cov_pose.isApprox(2.0 * two.poses[0].cov_pose));
+  CHECK(pose.cov_velocity.isApprox(3.0 * two.poses[0].cov_velocity));
+  CHECK(pose.validity == std::min(Validity::kValid, Validity::kCoasting));
+}
+
 TEST_CASE("nothing is interpolated outside or across a gap") {
   Trajectory trajectory = eight_trajectory(0.0, 10.0, 0.1);
   trajectory.poses.erase(trajectory.poses.begin() + 40, trajectory.poses.begin() + 60);
