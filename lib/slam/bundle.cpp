@@ -139,6 +139,13 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
     result.equations.add_distance(free[static_cast<size_t>(d.view_a)], free[static_cast<size_t>(d.view_b)],
                                   root_weight * between / (length * d.sigma), root_weight * residual);
   }
+  for (const BundleProblem::Standing& s : problem.standings) {
+    const auto earlier = static_cast<size_t>(s.view_a), later = static_cast<size_t>(s.view_b);
+    const StandingTie tie =
+        standing_tie(problem.views[earlier].T_map_camera, problem.views[later].T_map_camera, s.doubt);
+    result.cost += 0.5 * tie.missing.squaredNorm();
+    result.equations.add_tie(free[earlier], free[later], tie.J_earlier, tie.J_later, tie.missing);
+  }
   return result;
 }
 

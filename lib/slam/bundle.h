@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "slam/reprojection.h"
+#include "slam/standing.h"
 
 namespace roadfix {
 
@@ -36,10 +37,18 @@ struct BundleProblem {
     bool measured = false;  ///< and may be far off, as a wheel slips: counts linearly beyond five sigmas
   };
 
+  /// Two views of a car that stands: the later one is where the earlier one is, (M.8d).
+  struct Standing {
+    int view_a = 0;
+    int view_b = 0;
+    StandingDoubt doubt;
+  };
+
   std::vector<View> views;
   std::vector<Eigen::Vector3d> points;
   std::vector<Observation> observations;  ///< ascending by point, then view, left before right
   std::vector<Distance> distances;
+  std::vector<Standing> standings;
   SE3 T_right_left;     ///< as calibrated
   LensCorrection lens;  ///< what it is found to be
   LensCorrection lens_prior;

@@ -19,14 +19,38 @@ constexpr double kStandingShare = 0.4;  ///< of a keyframe's landmarks, below wh
 constexpr double kRipeShare = 0.5;    ///< tracks that could become points, over landmarks seen, that ask for a keyframe
 constexpr double kFoundMemory = 0.8;  ///< how much of the share found after keyframes stays from one to the next
 constexpr double kNoiseFlow = 1.67;   ///< sigmas: Rayleigh's median times root 2, a flow that is noise alone
+constexpr double kMedianNoise = 1.77;    ///< of the middle of n shifts between two sightings, times sigma / sqrt(n)
 constexpr double kStandingDepth = 10.0;  ///< m, of what is seen: how far a car may have crept by so little flow
+
+std::vector<double> lengths_of(const std::vector<Eigen::Vector2d>& shifts) {
+  std::vector<double> lengths;
+  for (const Eigen::Vector2d& shift : shifts) lengths.push_back(shift.norm());
+  return lengths;
+}
+
+/// The upper one of two; of one number at least.
+double median(std::vector<double> numbers) {
+  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
+  std::nth_element(numbers.begin(), middle, numbers.end());
+  return *middle;
+}
+
+/// Median of each coordinate.
+Eigen::Vector2d middle_of(const std::vector<Eigen::Vector2d>& shifts) {
+  std::vector<double> x, y;
+  for (const Eigen::Vector2d& shift : shifts) {
+    x.push_back(shift.x());
+    y.push_back(shift.y());
+  }
+  return {median(std::move(x)), median(std::move(y))};
+}
 
 }  // namespace
 
 /// Motion of tracks since the last keyframe beyond what turning by q_now_keyframe makes, px.
-std::vector<double> KeyframeTracker::flows_beyond(const Eigen::Quaterniond& q_now_keyframe,
-                                                  const std::vector<Feature>& features) const {
-  std::vector<double> flows;
+std::vector<Eigen::Vector2d> KeyframeTracker::shifts_beyond(const Eigen::Quaterniond& q_now_keyframe,
+                                                            const std::vector<Feature>& features) const {
+  std::vector<Eigen::Vector2d> shifts;
   for (const Feature& f : features) {
     const Landmark* landmark = map_.find(f.track);
     if (landmark == nullptr || landmark->sightings.empty()) continue;
@@ -34,9 +58,9 @@ std::vector<double> KeyframeTracker::flows_beyond(const Eigen::Quaterniond& q_no
     const auto now = left_.unproject(f.pixel.cast<double>());
     if (seen.keyframe != map_.last().id || !now) continue;
     const Eigen::Vector3d turned = q_now_keyframe * seen.left.homogeneous();
-    flows.push_back(left_.focal() * (*now - turned.hnormalized()).norm());
+    shifts.emplace_back(left_.focal() * (*now - turned.hnormalized()));
   }
-  return flows;
+  return shifts;
 }
 
 /// Descriptors find half of what there is already in the next picture, flow nearly all of it. What is lost then tells
@@ -55,19 +79,18 @@ int KeyframeTracker::num_ripe(const std::vector<Feature>& features) const {
     const Landmark* landmark = map_.find(f.track);
     if (landmark != nullptr && !landmark->p_map) waiting.push_back(f);
   }
-  const std::vector<double> flows = flows_beyond(q_now_keyframe, waiting);
+  const std::vector<double> flows = lengths_of(shifts_beyond(q_now_keyframe, waiting));
   return static_cast<int>(
       std::count_if(flows.begin(), flows.end(), [&](double flow) { return flow > config_.keyframe_flow_px; }));
 }
 
 bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const {
-  std::vector<double> flows = flows_beyond(T_map_camera_.q.conjugate() * map_.last().T_map_camera.q, features);
+  const Eigen::Quaterniond q_now_keyframe = T_map_camera_.q.conjugate() * map_.last().T_map_camera.q;
+  std::vector<double> flows = lengths_of(shifts_beyond(q_now_keyframe, features));
   if (flows.empty()) return true;
   const double mean = std::accumulate(flows.begin(), flows.end(), 0.0) / static_cast<double>(flows.size());
-  const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
-  std::nth_element(flows.begin(), middle, flows.end());
   // Standing still tells nothing new, but what drives by covers tracks for good.
-  const bool standing = *middle < config_.standing_flow_px;
+  const bool standing = median(std::move(flows)) < config_.standing_flow_px;
   const double share = standing ? kStandingShare : config_.keyframe_min_share;
   if (out_.num_inliers < share * found_share_ * landmarks_at_keyframe_) return true;
   if (static_cast<double>(num_ripe(features)) > kRipeShare * out_.num_inliers) return true;
@@ -77,21 +100,22 @@ bool KeyframeTracker::needs_keyframe(const std::vector<Feature>& features) const
 /// Without stereo no point is gained at a standstill, and what drives by covers those there are. That the picture
 /// stands still says where the camera is all the same.
 bool KeyframeTracker::hold(const CameraFrame& frame, const std::vector<Feature>& features) {
-  std::vector<double> flows = flows_beyond(Eigen::Quaterniond::Identity(), features);
-  if (static_cast<int>(flows.size()) < config_.weak_inliers) return false;
-  const bool few = static_cast<int>(flows.size()) < 2 * config_.weak_inliers;
-  const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
-  std::nth_element(flows.begin(), middle, flows.end());
+  const std::vector<Eigen::Vector2d> shifts = shifts_beyond(Eigen::Quaterniond::Identity(), features);
+  if (static_cast<int>(shifts.size()) < config_.weak_inliers) return false;
+  const bool few = static_cast<int>(shifts.size()) < 2 * config_.weak_inliers;
   const bool known = config_.standing_flow_px > 0.0;
   const double still_px = known ? std::hypot(config_.standing_flow_px, kNoiseFlow * config_.sigma_px) : 0.0;
-  if (*middle >= still_px) return false;
-  const double turn = still_px / left_.focal(), way = kStandingDepth * turn;
+  if (median(lengths_of(shifts)) >= still_px) return false;
+  // A turn moves all tracks alike; going ahead does not.
+  const double noise_px = kMedianNoise * config_.sigma_px / std::sqrt(static_cast<double>(shifts.size()));
+  const double turn = std::hypot(middle_of(shifts).norm(), noise_px) / left_.focal();
+  const double way = kStandingDepth * still_px / left_.focal();
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(way * way), Eigen::Vector3d::Constant(turn * turn);
   out_.state = TrackState::kWeak;
   out_.reason = "standing, with few landmarks";
   accept(frame.t_us, map_.last().T_map_camera, variances.asDiagonal());
-  if (few) make_keyframe(frame, features);
+  if (few) make_keyframe(frame, features, StandingDoubt{way, turn});
   return true;
 }
 
@@ -139,7 +163,8 @@ bool KeyframeTracker::pull_away(const CameraFrame& frame, const std::vector<Feat
   return true;
 }
 
-void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features) {
+void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features,
+                                    const std::optional<StandingDoubt>& stood) {
   std::vector<Feature> all;
   for (const Feature& f : features) {
     if (pixels_.contains(f.track)) all.push_back(f);
@@ -173,7 +198,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
     seen.push_back({all[i].track, *normalised, {}});
     if (right[i]) seen.back().right = right_lens.unproject(right[i]->cast<double>());
   }
-  const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}, LensPull::Zero()};
+  const Keyframe keyframe{0, frame.t_us, T_map_camera_, {}, LensPull::Zero(), stood};
   if (!map_.empty()) {
     const SE3& T_map_before = map_.last().T_map_camera;
     const SE3 T_before_now = T_map_before.inverse() * T_map_camera_;

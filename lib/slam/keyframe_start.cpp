@@ -187,7 +187,7 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
       wrong.push_back(pairs.tracks[i]);
     }
   }
-  map_.add_keyframe({0, start_->t_us, T_map_camera_, {}}, first);
+  map_.add_keyframe({0, start_->t_us, T_map_camera_, {}, LensPull::Zero(), {}}, first);
   const SE3 T_map_second = T_map_camera_ * SE3{motion->T_first_second.q, baseline * motion->T_first_second.p};
   front_end_->drop(wrong);
   out_.num_landmarks_seen = static_cast<int>(pairs.tracks.size());
@@ -199,7 +199,7 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
     second.push_back({f.track, *normalised, {}});
     pixels_[f.track] = f.pixel;
   }
-  map_.add_keyframe({0, frame.t_us, T_map_second, baseline}, second);
+  map_.add_keyframe({0, frame.t_us, T_map_second, baseline, LensPull::Zero(), {}}, second);
   landmarks_at_keyframe_ = count_landmarks(second);
   cov_own_.setZero();
   cov_window_.setZero();

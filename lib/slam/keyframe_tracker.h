@@ -225,13 +225,14 @@ class KeyframeTracker {
   void tell_motion(const Eigen::Matrix3d& cov_velocity);
   void drop_wrong_tracks(const std::vector<Feature>& features);
   void learn_found_share();
-  [[nodiscard]] std::vector<double> flows_beyond(const Eigen::Quaterniond& q_now_keyframe,
-                                                 const std::vector<Feature>& features) const;
+  [[nodiscard]] std::vector<Eigen::Vector2d> shifts_beyond(const Eigen::Quaterniond& q_now_keyframe,
+                                                           const std::vector<Feature>& features) const;
   [[nodiscard]] bool hold(const CameraFrame& frame, const std::vector<Feature>& features);
   [[nodiscard]] bool pull_away(const CameraFrame& frame, const std::vector<Feature>& features);
   [[nodiscard]] int num_ripe(const std::vector<Feature>& features) const;
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
-  void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features);
+  void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features,
+                     const std::optional<StandingDoubt>& stood = {});
   void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);
   void find_back(const CameraFrame& frame);
   [[nodiscard]] PlaceView view_of(const cv::Mat& gray, const std::vector<Feature>& features, int64_t t_us) const;

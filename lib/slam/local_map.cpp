@@ -155,6 +155,7 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
     job.keyframes.push_back(k.id);
     if (i == 0) continue;
     const int view = static_cast<int>(i);
+    if (k.stood) problem.standings.push_back({view - 1, view, *k.stood});
     if (const auto way = travel(keyframes_[i - 1], k)) {
       problem.distances.push_back({view - 1, view, way->distance, std::max(kMinTravelSigma, way->sigma), true});
     } else if (k.held_distance) {

@@ -42,10 +42,11 @@ struct Keyframe {
   SE3 T_map_camera;                     ///< of the left eye
   std::optional<double> held_distance;  ///< to the keyframe before: a unit of length, where nothing else gives one
   LensPull pull = LensPull::Zero();     ///< against the keyframes that were held when it was last adjusted
+  std::optional<StandingDoubt> stood;   ///< since the keyframe before
 
   template <class Self, class Archive>
   static void members(Self& self, Archive& archive) {
-    archive(self.id, self.t_us, self.T_map_camera, self.held_distance, self.pull);
+    archive(self.id, self.t_us, self.T_map_camera, self.held_distance, self.pull, self.stood);
   }
 };
 

@@ -80,6 +80,23 @@ void NormalEquations::add_distance(int free_a, int free_b, const Eigen::Vector3d
   if (free_a >= 0 && free_b >= 0) add(6 * std::max(free_a, free_b), 6 * std::min(free_a, free_b), -1.0);
 }
 
+void NormalEquations::add_tie(int free_a, int free_b, const Matrix6d& J_a, const Matrix6d& J_b,
+                              const Vector6d& residual) {
+  const auto add = [&](int row, int column, const Matrix6d& H) {
+    H_.block<6, 6>(6 * row, 6 * column) += H;
+    H_known_.block<6, 6>(6 * row, 6 * column) += H;
+  };
+  if (free_a >= 0) {
+    add(free_a, free_a, J_a.transpose() * J_a);
+    b_.segment<6>(6 * free_a) += J_a.transpose() * residual;
+  }
+  if (free_b >= 0) {
+    add(free_b, free_b, J_b.transpose() * J_b);
+    b_.segment<6>(6 * free_b) += J_b.transpose() * residual;
+  }
+  if (free_a >= 0 && free_b >= 0) add(free_b, free_a, J_b.transpose() * J_a);
+}
+
 void NormalEquations::add_lens_prior(const LensCorrection::Matrix& information,
                                      const LensCorrection::Vector& residual) {
   H_.block<kLens, kLens>(lens_row_, lens_row_) += information;

@@ -29,6 +29,9 @@ class NormalEquations {
   /// A residual on the positions of two views; either may be fixed (-1).
   void add_distance(int free_a, int free_b, const Eigen::Vector3d& J_b, double residual);
 
+  /// A residual on the poses of two views; either may be fixed (-1), and free_a is the earlier one.
+  void add_tie(int free_a, int free_b, const Matrix6d& J_a, const Matrix6d& J_b, const Vector6d& residual);
+
   /// What is known of the lens beforehand.
   void add_lens_prior(const LensCorrection::Matrix& information, const LensCorrection::Vector& residual);
 

@@ -164,7 +164,7 @@ TEST_CASE("mono keeps its pose at a red light, where its landmarks come to an en
               held.standing, held.moved, lost.valid);
   CHECK(held.standing > 20);
   CHECK(held.valid == held.standing);
-  CHECK(held.moved < 0.1);
+  CHECK(held.moved < 0.03);
   CHECK(lost.valid < lost.standing);  // teeth
   std::printf("pulling away: %d of %d pictures valid, %.1f m, wrong by %.3f m; %d without speeds\n", held.leaving_valid,
               held.leaving, held.way, held.error, untold.leaving_valid);
