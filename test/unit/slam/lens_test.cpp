@@ -86,5 +86,29 @@ TEST_CASE("a window that has not come to its minimum does not take away what is 
   CHECK(turned.numbers == turned.poses);
 }
 
+/// What is known of the focal length, over what was known, when a map of two keyframes has taken in a window whose
+/// curvature tells `told` times what is known of the lens.
+double doubt_after(double told) {
+  CameraRig rig;
+  rig.left = intrinsics_of(test::shortened("city_loop", 1.0).camera);
+  LocalMap map(rig, KeyframeTrackerConfig{});
+  map.add_keyframe({}, {});
+  map.add_keyframe({}, {});
+  const double before = map.focal_std();
+  BundleJob job = map.make_bundle([](const Keyframe&, const Keyframe&) { return std::optional<Travel>(); });
+  job.report.lens_cov = ((1.0 + told) * job.problem.lens_information).inverse();
+  job.report.pulls.resize(job.keyframes.size(), LensPull::Zero());
+  (void)map.apply(job);
+  return map.focal_std() / before;
+}
+
+TEST_CASE("a window whose curvature is none tells nothing of the lens, and one that has a little does") {
+  CHECK(doubt_after(-0.05) == 1.0);  // half of it, for two keyframes, is more than a hundredth
+  CHECK(doubt_after(-3.0) == 1.0);   // taken in, the information would be negative
+  // Teeth: what a window at its minimum tells is taken in, also where rounding makes it a little less than nothing.
+  CHECK(doubt_after(0.5) < 0.95);
+  CHECK(doubt_after(-0.01) > 1.0);
+}
+
 }  // namespace
 }  // namespace roadfix
