@@ -23,6 +23,4 @@ void add_magnitude(DirectionState& d, const DirectionLimits& limits, int64_t t_u
   }
 }
 
-void forget_direction(DirectionState& d) { d = {}; }
-
 }  // namespace roadfix

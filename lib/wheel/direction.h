@@ -24,7 +24,4 @@ inline constexpr double kReversible = 0.5;  ///< m/s
 void add_magnitude(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude, double predicted,
                    double variance);
 
-/// The car stands: either way is possible again.
-void forget_direction(DirectionState& d);
-
 }  // namespace roadfix

@@ -198,6 +198,15 @@ TEST_CASE("the mean of honest innovations is one, and the window forgets") {
   CHECK(watch.report(test::at(30.0)).used == 0);
 }
 
+TEST_CASE("what is refused has no say in the mean of the innovations") {
+  NisWatch watch("x", ConsistencyLimits{});
+  for (int i = 0; i < 40; ++i) watch.seen(test::at(0.01 * i), i % 4 == 0 ? 100.0 : 3.0, 2, i % 4 != 0);
+  const NisReport report = watch.report(test::at(0.4));
+  CHECK(report.used == 30);
+  CHECK(report.refused == 10);
+  CHECK(report.ratio == Approx(1.5));
+}
+
 TEST_CASE("refusals are over once a source is used again, or has fallen silent; those that go on are not") {
   // 10 Hz, refused for 3 s; then accepted, silent, or refused every second time.
   const auto refused_until = [](const std::function<std::optional<bool>(int)>& later) {

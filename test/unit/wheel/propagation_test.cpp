@@ -49,6 +49,20 @@ TEST_CASE("Jacobian of the propagation in all its forms") {
   }
 }
 
+TEST_CASE("biases walk, each by what is known of its own; scales and angles of mounting do not") {
+  WheelNoise noise;
+  noise.gyro_walk = 1e-3;
+  noise.accel_walk = 2e-2;
+  WheelStep step;
+  step.dt = 0.04;
+  step.accel = kStandardGravity * Eigen::Vector3d::UnitZ();
+  WheelState state;
+  propagate(state, step, noise);
+  for (int i = 0; i < 3; ++i) CHECK(state.P(kGyroBias + i, kGyroBias + i) == Approx(1e-6 * step.dt));
+  for (int i = 0; i < 2; ++i) CHECK(state.P(kAccelBias + i, kAccelBias + i) == Approx(4e-4 * step.dt));
+  for (const int i : {int{kWheelScale}, int{kSide}, int{kClimb}, int{kGyroScale}}) CHECK(state.P(i, i) == 0.0);
+}
+
 TEST_CASE("Jacobian of the levelling, corrected and plain") {
   std::mt19937_64 generator(44);
   for (int i = 0; i < 21; ++i) {
