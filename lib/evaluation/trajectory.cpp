@@ -45,17 +45,6 @@ Odometry blend(const Trajectory& trajectory, const Odometry& a, const Odometry& 
 
 }  // namespace
 
-int drop_backward(Trajectory& trajectory) {
-  std::vector<Odometry> kept;
-  kept.reserve(trajectory.poses.size());
-  for (const Odometry& pose : trajectory.poses) {
-    if (kept.empty() || pose.t_us > kept.back().t_us) kept.push_back(pose);
-  }
-  const auto dropped = static_cast<int>(trajectory.poses.size() - kept.size());
-  trajectory.poses = std::move(kept);
-  return dropped;
-}
-
 std::optional<Odometry> interpolate(const Trajectory& trajectory, int64_t t_us, int64_t max_gap_us) {
   const auto& poses = trajectory.poses;
   const auto after = std::lower_bound(poses.begin(), poses.end(), t_us, earlier);

@@ -16,9 +16,6 @@ struct Trajectory {
   bool has_velocity = true;  ///< in vehicle axes with attitude, in the frame's axes without
 };
 
-/// Drops what does not move forward in time (a restarted stage may repeat itself); returns the number dropped.
-int drop_backward(Trajectory& trajectory);
-
 /// The pose at t_us: position by cubic Hermite where there is velocity and by line elsewhere, attitude along the
 /// geodesic, the rest linear, validity the lower one. Nothing outside the trajectory or in a gap longer than
 /// max_gap_us.

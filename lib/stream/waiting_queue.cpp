@@ -57,11 +57,4 @@ std::size_t WaitingQueue::depth(int input) const {
       std::count_if(queue_.begin(), queue_.end(), [&](const WaitingInput& w) { return w.input == input; }));
 }
 
-std::optional<int64_t> WaitingQueue::oldest_utime(int input) const {
-  for (const WaitingInput& waiting : queue_) {
-    if (waiting.input == input) return waiting.id.utime;
-  }
-  return std::nullopt;
-}
-
 }  // namespace roadfix

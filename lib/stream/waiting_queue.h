@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,7 +35,6 @@ class WaitingQueue {
   [[nodiscard]] std::size_t size() const { return queue_.size(); }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t depth(int input) const;
-  [[nodiscard]] std::optional<int64_t> oldest_utime(int input) const;
 
  private:
   std::deque<WaitingInput> queue_;

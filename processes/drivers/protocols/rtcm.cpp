@@ -21,9 +21,4 @@ Probe probe_rtcm(std::span<const uint8_t> bytes) {
   return {Fit::kFrame, size};
 }
 
-int rtcm_message_number(std::span<const uint8_t> frame) {
-  if (frame.size() < kHeaderBytes + 2 + kCrcBytes) return 0;
-  return (frame[kHeaderBytes] << 4) | (frame[kHeaderBytes + 1] >> 4);
-}
-
 }  // namespace roadfix

@@ -11,7 +11,4 @@ namespace roadfix {
 
 Probe probe_rtcm(std::span<const uint8_t> bytes);
 
-/// The message number (DF002), for example 1005; 0 for a frame that is too short to have one.
-int rtcm_message_number(std::span<const uint8_t> frame);
-
 }  // namespace roadfix

@@ -15,6 +15,4 @@ std::optional<FixType> fix_type_from_name(std::string_view name) {
   return std::nullopt;
 }
 
-std::string fix_type_name(FixType type) { return fix_type_names().at(static_cast<std::size_t>(type)); }
-
 }  // namespace roadfix

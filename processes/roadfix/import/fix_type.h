@@ -13,6 +13,5 @@ namespace roadfix {
 /// none, single, differential, rtk_float, rtk_fixed, dead_reckoning.
 const std::vector<std::string>& fix_type_names();
 std::optional<FixType> fix_type_from_name(std::string_view name);
-std::string fix_type_name(FixType type);
 
 }  // namespace roadfix

@@ -63,14 +63,6 @@ TEST_CASE("nothing is interpolated outside or across a gap") {
   CHECK(interpolate(trajectory, 5'000'000, 3'000'000));
 }
 
-TEST_CASE("a stream that runs backwards keeps what moves forward") {
-  Trajectory trajectory = eight_trajectory(0.0, 1.0, 0.1);
-  trajectory.poses.push_back(eight(0.5));
-  trajectory.poses.push_back(eight(1.1));
-  CHECK(drop_backward(trajectory) == 1);
-  CHECK(trajectory.poses.back().t_us == 1'100'000);
-}
-
 TEST_CASE("pairs are formed at the times of the sparser stream") {
   const Trajectory dense = eight_trajectory(0.0, 20.0, 0.005);
   const Trajectory sparse = eight_trajectory(0.0425, 19.0, 0.1);
