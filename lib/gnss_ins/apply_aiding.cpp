@@ -41,9 +41,10 @@ void straighten(Measurement<1>& m, const InsCore& core, int axis, double gain, d
 Measurement<3> position_of(const InsCore& core, const Pending& p) {
   Measurement<3> m = gnss_position(core.state(), core.motion(), p.value, p.cov, p.ahead(core.state()));
   m.alike = p.alike;
-  if (p.fix_type != FixType::kRtkFixed && core.back().active) {
+  if (p.fix_type != FixType::kRtkFixed && core.fix_error().active()) {
     m.displaced = 0;
     m.residual -= core.displacement();
+    m.R *= 1.0 - core.fix_error().lasting_share();
   }
   return m;
 }
@@ -91,7 +92,7 @@ AidingRecord AidingApplier::apply(InsCore& core, const Pending& p, const Gates& 
 }
 
 bool AidingApplier::agrees_undisplaced(const InsCore& core, const Pending& p, const Gates& gates) const {
-  if (p.fix_type == FixType::kRtkFixed || !core.back().active) return false;
+  if (p.fix_type == FixType::kRtkFixed || !core.fix_error().returning()) return false;
   InsCore plain = core;
   plain.end_return();
   return apply(plain, p, gates).status == AidingStatus::kAccepted;

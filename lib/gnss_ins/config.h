@@ -68,6 +68,7 @@ struct AidingConfig {
   bool use_mag = true;
   bool use_error_correlation = true;  ///< of successive GNSS positions
   bool use_return_error = true;       ///< a receiver may come back from an outage displaced
+  bool use_lasting_error = true;      ///< part of a GNSS position's error is that of the one before
   bool use_second_order = true;       ///< of the vehicle's velocity, while its heading is unsure
 };
 
@@ -160,6 +161,7 @@ void visit(AidingConfig& c, Visitor& v) {
   v.boolean("use_mag", c.use_mag);
   v.boolean("use_error_correlation", c.use_error_correlation);
   v.boolean("use_return_error", c.use_return_error);
+  v.boolean("use_lasting_error", c.use_lasting_error);
   v.boolean("use_second_order", c.use_second_order);
 }
 

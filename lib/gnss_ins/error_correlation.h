@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gnss_ins/lasting_watch.h"
 #include "gnss_ins/noise_scale.h"
 #include "samples/samples.h"
 
@@ -78,11 +79,13 @@ class ErrorCorrelation {
 struct PositionQuality {
   NoiseScale noise;
   ErrorCorrelation correlation;
+  LastingEvidence lasting;
 
   template <class Archive>
   void serialise(Archive& a) {
     noise.serialise(a);
     correlation.serialise(a);
+    lasting.serialise(a);
   }
 };
 

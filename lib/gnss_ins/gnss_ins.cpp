@@ -142,6 +142,7 @@ void GnssIns::align_again() {
   jump_ = JumpJudge();
   wheel_doubt_ = WheelDoubt();
   imu_doubt_ = ImuDoubt();
+  lasting_watch_.begin_anew();
   forward_stale_ = true;
   lag_us_ = lag_of(prior_age(config_.vehicle));
 }

@@ -95,6 +95,9 @@ class GnssIns {
   void doubt_imu(const Pending& p, const Eigen::Vector3d& off);
   void show_anew(const Pending& p);
   void begin_return(const Pending& p);
+  [[nodiscard]] LastingShare lasting_of(FixType type) const;
+  AidingRecord try_position(const Pending& p, const LastingShare& lasting);
+  void watch_lasting(const Pending& measured, const Pending& p, const Eigen::Vector3d& before);
   void weigh_by_itself(const Pending& measured, NoiseScale& noise);
   /// While coasting: when position or zero velocity was last used.
   [[nodiscard]] std::optional<int64_t> coasting_since() const;
@@ -118,6 +121,7 @@ class GnssIns {
   AidingApplier applier_;
   Gates gates_, no_gates_, no_use_;                  // as configured; that pass all; that pass nothing
   std::array<PositionQuality, 6> position_quality_;  // by FixType
+  LastingWatch lasting_watch_;
   NoiseScale velocity_noise_;
   ImuMonitor monitor_;
   GnssScreen screen_;

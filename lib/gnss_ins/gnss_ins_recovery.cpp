@@ -113,13 +113,15 @@ void GnssIns::use_position(const Pending& measured) {
   p.cov *= quality.noise.variance_factor();
   if (config_.aiding.use_error_correlation) p.alike = quality.correlation.inflation();
 
-  AidingRecord r = applier_.apply(*core_, p, gates_);
+  const LastingShare lasting = lasting_of(p.fix_type);
+  const Eigen::Vector3d displaced = core_->displacement();
+  AidingRecord r = try_position(p, lasting);
   if (r.status == AidingStatus::kGated && applier_.agrees_undisplaced(*core_, p, gates_)) {
     begin_return(p);  // it has jumped back
     r = applier_.apply(*core_, p, gates_);
   }
   const double sigma = std::sqrt(p.cov(0, 0) + p.cov(1, 1));
-  if (core_->back().active && core_->back().size() < kReturnOver * sigma) core_->end_return();
+  if (core_->fix_error().returning() && core_->fix_error().return_size() < kReturnOver * sigma) core_->end_return();
   // A jump, or a receiver that is dragged away from what wheels or its own velocity say, tells nothing of the noise.
   const bool jumped = jump_.judge(r, config_.aiding.gate_sigma);
   const bool heading_holds = agrees_with(AidingSource::kGnssVelocity, p.t_us);
@@ -143,6 +145,10 @@ void GnssIns::use_position(const Pending& measured) {
   } else if (r.status == AidingStatus::kAccepted) {
     height_refused_since_us_ = 0;
   }
+  if (lasting.share > 0.0 && r.status == AidingStatus::kAccepted)
+    watch_lasting(measured, p, Eigen::Map<const Eigen::Vector3d>(r.innovation.data()) + displaced);
+  else if (lasting.share == 0.0)
+    lasting_watch_.begin_anew();
   quality.correlation.learn(r, p.cov.diagonal(), p.alike);
   if (r.status == AidingStatus::kAccepted) {
     if (agreed_since_us_ == 0) agreed_since_us_ = p.t_us;
@@ -171,6 +177,7 @@ void GnssIns::use_position(const Pending& measured) {
 /// After an outage what the receiver has shown tells little of it. A fixed carrier phase was checked against its
 /// neighbours before it was called so.
 void GnssIns::show_anew(const Pending& p) {
+  lasting_watch_.begin_anew();
   const bool returned = position_at_us_ != 0 && config_.aiding.use_return_error;
   for (size_t type = 0; type < position_quality_.size(); ++type) {
     PositionQuality& quality = position_quality_[type];
@@ -213,6 +220,7 @@ void GnssIns::recover(const Pending& p) {
   P.diagonal().segment<3>(kGyroBias).array() += config_.vehicle.gyro_bias_std * config_.vehicle.gyro_bias_std;
   P.diagonal().segment<3>(kAccelBias).array() += config_.vehicle.accel_bias_std * config_.vehicle.accel_bias_std;
   core_->initialise(before, P);
+  lasting_watch_.begin_anew();
   (void)applier_.apply(*core_, p, no_gates_);
   const NavState& after = core_->state();
   ++reset_counter_;

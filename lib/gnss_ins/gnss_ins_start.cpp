@@ -81,7 +81,10 @@ void GnssIns::try_start(const ImuSample& imu) {
   const double moved =
       s.velocity_std * std::abs(age) +
       s.velocity.norm() * std::hypot(config_.vehicle.position_latency_std, config_.vehicle.time_offset_std);
-  s.antenna_cov = fix_->cov_enu + (moved * moved + 1e-4) * Eigen::Matrix3d::Identity();
+  s.fix_type = fix_->fix_type;
+  s.fix_cov = fix_->cov_enu;
+  s.lasting = lasting_of(s.fix_type);
+  s.antenna_cov = s.fix_cov + (moved * moved + 1e-4) * Eigen::Matrix3d::Identity();
   if (fix_->heading) {
     s.yaw = wrap_angle(0.5 * kPi - fix_->heading->heading - config_.vehicle.mounting.y());
     s.yaw_std =
@@ -170,7 +173,12 @@ void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& nois
   bank_.predict(imu, dt, noise);
   const auto leader = [&]() -> const NavState& { return bank_.leader().state(); };
   pending_.take_due(leader, [&](const Pending& p) {
-    note(bank_.aid([&](InsCore& core) { return applier_.apply(core, p, no_gates_); }), p.id);
+    const LastingShare lasting = p.kind == PendingKind::kPosition ? lasting_of(p.fix_type) : LastingShare();
+    const auto apply = [&](InsCore& core) {
+      if (lasting.share > 0.0) core.expect_lasting(p.fix_type, lasting, p.cov.diagonal());
+      return applier_.apply(core, p, no_gates_);
+    };
+    note(bank_.aid(apply), p.id);
   });
   if (due(next_sideslip_us_, imu.t_us, config_.aiding.sideslip_interval))
     note(bank_.aid([&](InsCore& core) { return applier_.sideslip(core, no_gates_, Beside::kSoughtHeading); }), 0);

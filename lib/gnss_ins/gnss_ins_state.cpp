@@ -42,6 +42,7 @@ void GnssIns::serialise(Archive& a) {
   bank_.serialise(a, anchor_.value_or(Geodetic()));
   applier_.serialise(a);
   for (PositionQuality& quality : position_quality_) quality.serialise(a);
+  lasting_watch_.serialise(a);
   velocity_noise_.serialise(a);
   jump_.serialise(a);
   wheel_doubt_.serialise(a);

@@ -97,8 +97,13 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   const Eigen::Vector3d gravity = core.earth().gravity(x.position);
   (void)core.fuse(AidingSource::kZeroVelocity, s.t_us, levelling(x, s.mean_accel, gravity, s.accel_std), kNoGate);
   const BodyMotion still;
-  (void)core.fuse(AidingSource::kGnssPosition, s.t_us,
-                  gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0), kNoGate);
+  Measurement<3> place = gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0);
+  if (s.lasting.share > 0.0) {
+    core.expect_lasting(s.fix_type, s.lasting, s.fix_cov.diagonal());
+    place.displaced = 0;
+    place.R -= s.lasting.share * s.fix_cov;
+  }
+  (void)core.fuse(AidingSource::kGnssPosition, s.t_us, place, kNoGate);
   Measurement<3> velocity = zero_velocity(core.state(), s.velocity_std);
   velocity.residual += s.velocity;
   (void)core.fuse(AidingSource::kGnssVelocity, s.t_us, velocity, kNoGate);

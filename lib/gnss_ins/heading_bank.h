@@ -20,6 +20,9 @@ struct StartState {
   double accel_std = 1.0;                             ///< m/s2, how far the mean may be from gravity
   Eigen::Vector3d antenna = Eigen::Vector3d::Zero();  ///< m, enu
   Eigen::Matrix3d antenna_cov = Eigen::Matrix3d::Identity();
+  FixType fix_type = FixType::kNone;                   ///< of the fix in it,
+  LastingShare lasting;                                ///< what of that fix lasts,
+  Eigen::Matrix3d fix_cov = Eigen::Matrix3d::Zero();   ///< and its covariance, m2
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, enu
   double velocity_std = 1.0;
   std::optional<double> yaw;  ///< rad, vehicle, where a sensor gives it

@@ -17,7 +17,7 @@ InsCore::InsCore(const GnssInsConfig& config, const Geodetic& anchor) : config_(
 void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
   x_ = x;
   P_ = P;
-  back_.end();
+  fix_error_ = FixError();
   sums_ = TransitionSums();
   last_ = InertialStep();
   motion_ = BodyMotion();
@@ -67,7 +67,7 @@ void InsCore::flush() {
   if (sums_.duration <= 0.0) return;
   const Transition phi(sums_, earth_.rate(), config_);
   propagate_covariance(P_, phi, sums_, P_);
-  if (back_.active) back_.move(phi, sums_.duration);
+  if (fix_error_.active()) fix_error_.move(phi, sums_.duration);
   sums_ = TransitionSums();
 }
 

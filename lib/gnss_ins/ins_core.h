@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include "gnss_ins/aiding.h"
 #include "gnss_ins/covariance_step.h"
@@ -43,14 +44,17 @@ class InsCore {
   template <int Rows>
   AidingRecord fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
     ErrorMatrix moved;
-    ReturnError back = back_;
+    std::optional<FixError> error;
     const bool moves = sums_.duration > 0.0;
     if (moves) {
       const Transition phi(sums_, earth_.rate(), config_);
       propagate_covariance(P_, phi, sums_, moved);
-      if (back.active) back.move(phi, sums_.duration);
+      if (fix_error_.active()) {
+        error = fix_error_;
+        error->move(phi, sums_.duration);
+      }
     }
-    Innovation<Rows> innovation(moves ? moved : P_, back, m);
+    Innovation<Rows> innovation(moves ? moved : P_, error ? *error : fix_error_, m);
     AidingRecord record = record_of(source, t_us, m, innovation);
     record.status = !innovation.usable       ? AidingStatus::kBadInput
                     : innovation.nis <= gate ? AidingStatus::kAccepted
@@ -58,11 +62,11 @@ class InsCore {
     if (record.status != AidingStatus::kAccepted) return record;
     if (moves) {
       P_ = moved;
-      back_ = back;
+      if (error) fix_error_ = *error;
       sums_ = TransitionSums();
     }
     if (m.alike > 1.0) innovation.weigh(m.residual, m.alike * m.R);
-    innovation.apply(x_, P_, back_, considered_);
+    innovation.apply(x_, P_, fix_error_, considered_);
     return record;
   }
 
@@ -78,12 +82,17 @@ class InsCore {
   /// The receiver has come back from an outage: its fixes may be displaced by as much as sigma (m, enu), (M.37).
   void begin_return(const Eigen::Vector3d& sigma) {
     flush();
-    back_.begin(sigma);
+    fix_error_.begin_return(sigma);
   }
-  void end_return() { back_.end(); }
-  [[nodiscard]] const ReturnError& back() const { return back_; }
+  void end_return() { fix_error_.end_return(); }
+  /// Fixes are of this type and variance (m2, enu) from now on, and this much of it lasts, (M.47).
+  void expect_lasting(FixType type, const LastingShare& like, const Eigen::Vector3d& variance) {
+    flush();
+    fix_error_.expect_lasting(type, like, variance, x_, P_);
+  }
+  [[nodiscard]] const FixError& fix_error() const { return fix_error_; }
   /// m, enu, by which the receiver is believed to be displaced at the state's epoch.
-  [[nodiscard]] Eigen::Vector3d displacement() const { return back_.after(sums_.duration); }
+  [[nodiscard]] Eigen::Vector3d displacement() const { return fix_error_.after(sums_.duration); }
   [[nodiscard]] const BodyMotion& motion() const { return motion_; }
   [[nodiscard]] const InertialStep& last_step() const { return last_; }
   [[nodiscard]] EarthModel& earth() { return earth_; }
@@ -95,7 +104,7 @@ class InsCore {
     x_.serialise(a);
     sums_.serialise(a);
     last_.serialise(a);
-    back_.serialise(a);
+    fix_error_.serialise(a);
     a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size, ahead_);
   }
 
@@ -106,8 +115,8 @@ class InsCore {
     d.add(local(NavState(), x_));
     d.add(x_.q_enu_imu.coeffs());
     d.add(P_);
-    d.add(back_.value);
-    d.add(back_.cov);
+    d.add(fix_error_.value);
+    d.add(fix_error_.cov);
     d.add(sums_.velocity_change);
     d.add(Eigen::Matrix<double, 4, 3>(sums_.sum.leftCols<3>()));
   }
@@ -121,7 +130,7 @@ class InsCore {
   ErrorMatrix P_ = ErrorMatrix::Identity();
   TransitionSums sums_;
   InertialStep last_;
-  ReturnError back_;
+  FixError fix_error_;
   BodyMotion motion_;
   StateRange considered_;
   bool ahead_ = false;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "gnss_ins/return_error.h"
+#include "gnss_ins/fix_error.h"
 
 namespace roadfix {
 
@@ -15,7 +15,7 @@ struct Measurement {
   Eigen::Matrix<double, Rows, 1> residual = Eigen::Matrix<double, Rows, 1>::Zero();
   Eigen::Matrix<double, Rows, kStates> H = Eigen::Matrix<double, Rows, kStates>::Zero();
   Eigen::Matrix<double, Rows, Rows> R = Eigen::Matrix<double, Rows, Rows>::Identity();
-  int displaced = -1;  ///< the first row has the return error of this axis in it, the next that of the next, (M.38)
+  int displaced = -1;  ///< the first row has the fix error of this axis in it, the next that of the next, (M.38)
   double alike = 1.0;  ///< the update takes R times this, because errors repeat; the gate does not, (M.36)
 };
 
@@ -59,7 +59,7 @@ class Innovation {
   using Small = Eigen::Matrix<double, Rows, Rows>;
   using Residual = Eigen::Matrix<double, Rows, 1>;
 
-  Innovation(const ErrorMatrix& P, const ReturnError& back, const Measurement<Rows>& m) {
+  Innovation(const ErrorMatrix& P, const FixError& error, const Measurement<Rows>& m) {
     // Most of H is zero.
     std::array<int, kStates> used{};
     int count = 0;
@@ -79,7 +79,7 @@ class Innovation {
       const int k = used[static_cast<size_t>(i)];
       explained_ += m.H.col(k).lazyProduct(PHt_.row(k));
     }
-    if (back.active) displace(back, m);
+    if (error.active()) displace(error, m);
     weigh(m.residual, m.R);
   }
 
@@ -105,7 +105,7 @@ class Innovation {
   /// Kalman update in the symmetric form P -= Y Y', Y = P H' L^-T with S = L L' (M.20): every element and its mirror
   /// are the same sum of the same products. `considered` states keep value and variance, but their uncertainty counts
   /// (Schmidt 1966).
-  void apply(NavState& x, ErrorMatrix& P, ReturnError& back, const StateRange& considered) const {
+  void apply(NavState& x, ErrorMatrix& P, FixError& error, const StateRange& considered) const {
     Eigen::Matrix<double, kStates, Rows> Y;
     for (int i = 0; i < Rows; ++i) {
       ErrorVector column = PHt_.col(i);
@@ -123,7 +123,7 @@ class Innovation {
           before.block(considered.first, considered.first, considered.size, considered.size);
     }
     x = retract(x, dx);
-    if (back.active) apply(back, Y);
+    if (error.active()) apply(error, Y);
   }
 
   Residual variance = Residual::Zero();
@@ -132,30 +132,34 @@ class Innovation {
   bool usable = false;  ///< S positive definite and everything finite
 
  private:
-  using Back = Eigen::Matrix<double, ReturnError::kSize, Rows>;
+  using OfError = Eigen::Matrix<double, FixError::kSize, Rows>;
 
-  // What the return error has in the measurement and in its correlations.
-  void displace(const ReturnError& back, const Measurement<Rows>& m) {
-    back_PHt_ = back.cross.transpose().lazyProduct(m.H.transpose());
+  // What the fix error has in the measurement and in its correlations.
+  void displace(const FixError& error, const Measurement<Rows>& m) {
+    error_PHt_ = error.cross.transpose().lazyProduct(m.H.transpose());
     if (m.displaced < 0) return;
-    const auto cross = back.cross.template middleCols<Rows>(m.displaced);
+    const int returning = FixError::kReturning + m.displaced, lasting = FixError::kLasting + m.displaced;
+    const Eigen::Matrix<double, kStates, Rows> cross =
+        error.cross.template middleCols<Rows>(returning) + error.cross.template middleCols<Rows>(lasting);
+    const OfError cov = error.cov.template middleCols<Rows>(returning) + error.cov.template middleCols<Rows>(lasting);
     const Small shared = m.H.lazyProduct(cross);
-    explained_ += shared + shared.transpose() + back.cov.template block<Rows, Rows>(m.displaced, m.displaced);
+    explained_ += shared + shared.transpose();
+    explained_ += cov.template middleRows<Rows>(returning) + cov.template middleRows<Rows>(lasting);
     PHt_ += cross;
-    back_PHt_ += back.cov.template middleCols<Rows>(m.displaced);
+    error_PHt_ += cov;
   }
 
-  void apply(ReturnError& back, const Eigen::Matrix<double, kStates, Rows>& Y) const {
-    Back Z;
+  void apply(FixError& error, const Eigen::Matrix<double, kStates, Rows>& Y) const {
+    OfError Z;
     for (int i = 0; i < Rows; ++i) {
-      typename Back::ColXpr column = Z.col(i);
-      column = back_PHt_.col(i);
+      typename OfError::ColXpr column = Z.col(i);
+      column = error_PHt_.col(i);
       for (int k = 0; k < i; ++k) column -= L_(i, k) * Z.col(k);
       column /= L_(i, i);
     }
-    back.value += Z.lazyProduct(whitened_);
-    back.cross -= Y.lazyProduct(Z.transpose());
-    back.cov -= Z.lazyProduct(Z.transpose());
+    error.value += Z.lazyProduct(whitened_);
+    error.cross -= Y.lazyProduct(Z.transpose());
+    error.cov -= Z.lazyProduct(Z.transpose());
   }
 
   static void subtract(ErrorMatrix& P, const Eigen::Matrix<double, kStates, Rows>& Y) {
@@ -179,7 +183,7 @@ class Innovation {
   }
 
   Eigen::Matrix<double, kStates, Rows> PHt_;
-  Back back_PHt_;            // of the return error
+  OfError error_PHt_;        // of the fix error
   Small explained_;          // H P H'
   Small L_ = Small::Zero();  // lower triangle
   Residual whitened_ = Residual::Zero();

@@ -141,6 +141,7 @@ double honest_share(bool learns_correlation) {
     s.faults.clear();
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_error_correlation = learns_correlation;
+    config.aiding.use_lasting_error = learns_correlation;
     GnssIns filter(config);
     score.run(filter, drive, 60.0, s.duration_s);
   }
@@ -183,6 +184,7 @@ Return return_from_tunnel(const char* reacquire, FixType type, double sigma_m, b
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_return_error = expects;
     config.aiding.use_error_correlation = alike;
+    config.aiding.use_lasting_error = expects && alike;
     GnssIns filter(config);
     score.run(filter, drive, 151.0, 171.0);
   }
