@@ -20,6 +20,7 @@ constexpr double kRipeShare = 0.5;    ///< tracks that could become points, over
 constexpr double kFoundMemory = 0.8;  ///< how much of the share found after keyframes stays from one to the next
 constexpr double kNoiseFlow = 1.67;   ///< sigmas: Rayleigh's median times root 2, a flow that is noise alone
 constexpr double kMedianNoise = 1.77;    ///< of the middle of n shifts between two sightings, times sigma / sqrt(n)
+constexpr double kWalkInMean = 3.0;      ///< a walk's variance at its end over that of its mean
 constexpr double kStandingDepth = 10.0;  ///< m, of what is seen: how far a car may have crept by so little flow
 
 std::vector<double> lengths_of(const std::vector<Eigen::Vector2d>& shifts) {
@@ -226,6 +227,25 @@ void KeyframeTracker::begin_bundle() {
   executor_.start([job, iterations] { job->report = adjust(job->problem, iterations); });
 }
 
+/// What a window hands on of its scale is off by what it has its own length wrong by, and the next ones begin with it:
+/// a walk, (M.22a).
+void KeyframeTracker::lose_scale(const BundleJob& job) {
+  const BundleProblem& problem = job.problem;
+  const bool told = std::any_of(problem.distances.begin(), problem.distances.end(),
+                                [](const BundleProblem::Distance& d) { return d.measured; });
+  if (told || (stereo_ && !map_.one_eyed())) return;
+  const auto held = std::find_if(problem.views.rbegin(), problem.views.rend(), [](const auto& v) { return v.fixed; });
+  if (held == problem.views.rbegin() || held == problem.views.rend()) return;
+  const auto steps = static_cast<double>(held - problem.views.rbegin());
+  const Eigen::Vector3d way = problem.views.back().T_map_camera.p - held->T_map_camera.p;
+  const double length2 = way.squaredNorm();
+  if (!(length2 > 0.0)) return;
+  const double along = way.dot(job.report.clustered_cov_last.topLeftCorner<3, 3>() * way) / length2;
+  const double lost = kWalkInMean * along / (length2 * steps);
+  shared_.lose_scale(lost);
+  shared_closed_.lose_scale(lost);
+}
+
 void KeyframeTracker::finish_bundle() {
   if (!job_) return;
   executor_.wait();
@@ -239,6 +259,7 @@ void KeyframeTracker::finish_bundle() {
   const Matrix6d grown = job_->report.clustered_cov_last / static_cast<double>(std::max<ptrdiff_t>(1, steps));
   cov_keyframe_ += grown;
   cov_own_ += grown;
+  lose_scale(*job_);
   cov_window_ = job_->report.clustered_cov_last;
   cov_closed_ += in_map(grown, loops_.S_map_odom());
   job_.reset();

@@ -8,6 +8,7 @@
 namespace roadfix {
 namespace {
 
+constexpr double kUnseen = 1.5;    ///< m/s2, as in travel.cpp: what a car's speed changes by unseen
 constexpr double kNearFlow = 2.0;  ///< start flows by which tracks have moved that alone are enough to begin
 
 }  // namespace
@@ -168,9 +169,9 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   if (known) {
     baseline = std::max(0.01, known->travel.distance);
     name_scale(*known);
-  } else if (motion_ && motion_->dt_s > 0.0) {  // as fast as before the map was lost
-    baseline =
-        std::max(0.01, motion_->T_before_now.p.norm() / motion_->dt_s * seconds_between(start_->t_us, frame.t_us));
+  } else if (motion_ && motion_->dt_s > 0.0) {  // as fast as before the map was lost, or pulling away
+    const double dt_s = seconds_between(start_->t_us, frame.t_us);
+    baseline = std::max({0.01, motion_->T_before_now.p.norm() / motion_->dt_s * dt_s, 0.5 * kUnseen * dt_s * dt_s});
   }
   std::vector<KeyframeFeature> first, second;
   pixels_.clear();
@@ -209,7 +210,6 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
                           seconds_between(start_->t_us, frame.t_us)};
   start_.reset();
   // The mean of what may have been seconds: a car that pulls away is faster at their end.
-  constexpr double kUnseen = 1.5;  // m/s2, as in travel.cpp
   Matrix6d cov_going = cov_own_;
   const double slip = 0.5 * kUnseen * going.dt_s * going.dt_s;
   cov_going.topLeftCorner<3, 3>().diagonal().array() += slip * slip;

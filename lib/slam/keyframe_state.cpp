@@ -153,6 +153,8 @@ std::optional<KeyframeTracker::KnownTravel> KeyframeTracker::camera_travelled(in
 void KeyframeTracker::name_scale(const KnownTravel& known) {
   scale_ = known.source == SpeedSource::kIns ? ScaleSource::kIns : ScaleSource::kWheels;
   scale_std_ = known.travel.scale_std;
+  shared_.keep_scale();
+  shared_closed_.keep_scale();
 }
 
 /// A map that began without scale gets one where speeds have come since; later ones say where theirs comes from.

@@ -251,7 +251,9 @@ void KeyframeTracker::tell_pose(const SE3& T_map_camera, const Matrix6d& cov_cam
   const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
   const SharedDoubt doubt = shared_doubt();
-  shared_.go_to(T_map_camera, doubt);
+  const bool metres = stereo_ || scale_ != ScaleSource::kNone;
+  const Eigen::Vector3d lever = metres ? Eigen::Vector3d::Zero() : T_camera_vehicle.p;
+  shared_.go_to(T_map_camera, doubt, lever);
   const Matrix6d cov = carried(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
   out_.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle;
   out_.odometry.cov_pose = carried(cov + shared_.cov(), T_map_camera, T_camera_vehicle);
@@ -262,7 +264,7 @@ void KeyframeTracker::tell_pose(const SE3& T_map_camera, const Matrix6d& cov_cam
   const Sim3& S_map_odom = loops_.S_map_odom();
   const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
   const SE3 T_closed_camera = (S_map_odom * Sim3{T_map_camera.q, T_map_camera.p, 1.0}).rigid();
-  shared_closed_.go_to(T_closed_camera, doubt);
+  shared_closed_.go_to(T_closed_camera, doubt, lever);
   const Matrix6d cov_closed = carried(cov_closed_, T_closed_keyframe, T_keyframe_now) + in_map(cov_camera, S_map_odom);
   out_.cov_closed = carried(cov_closed + shared_closed_.cov(), T_closed_camera, T_camera_vehicle);
 }

@@ -178,6 +178,7 @@ class KeyframeTracker {
   [[nodiscard]] std::string unusable(const CameraFrame& frame);
   void finish_bundle();
   void begin_bundle();
+  void lose_scale(const BundleJob& job);
   void start(const CameraFrame& frame);
   void start_after(const std::string& loss, const CameraFrame& frame);
   void start_stereo(const CameraFrame& frame);

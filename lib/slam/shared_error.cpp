@@ -4,25 +4,58 @@
 #include "slam/pose_covariance.h"
 
 namespace roadfix {
+namespace {
+
+constexpr double kUnitStd = 1.0;  ///< of the logarithm of a unit that nobody knows
+
+}  // namespace
 
 void SharedError::begin_at(const SE3& T_map_camera) {
   begun_ = true;
   T_map_camera_ = T_map_camera;
   columns_.setZero();
+  cov_drift_.setZero();
+  lever_.setZero();
+  keep_scale();
 }
 
-void SharedError::go_to(const SE3& T_map_camera, const SharedDoubt& doubt) {
+Matrix6d SharedError::cov() const {
+  Matrix6d cov = columns_ * columns_.transpose() + cov_drift_;
+  cov.topLeftCorner<3, 3>() += kUnitStd * kUnitStd * lever_ * lever_.transpose();
+  return cov;
+}
+
+void SharedError::keep_scale() {
+  cov_drift_scale_.setZero();
+  cov_scale_ = 0.0;
+}
+
+void SharedError::go_to(const SE3& T_map_camera, const SharedDoubt& doubt, const Eigen::Vector3d& lever) {
   if (!begun_) return begin_at(T_map_camera);
   const SE3 T_before_now = T_map_camera_.inverse() * T_map_camera;
-  columns_ = carried_by(T_map_camera_, T_before_now) * columns_;
+  const Matrix6d F = carried_by(T_map_camera_, T_before_now);
+  columns_ = F * columns_;
   columns_.col(0).head<3>() += doubt.lengths * (T_map_camera.p - T_map_camera_.p);
   columns_.col(1).tail<3>() += doubt.turns * log_q(T_before_now.q);
+  Vector6d step = Vector6d::Zero();
+  step.head<3>() = T_map_camera.p - T_map_camera_.p;
+  cov_drift_scale_ = (F * cov_drift_scale_).eval();
+  cov_drift_ = (F * cov_drift_ * F.transpose() + cov_drift_scale_ * step.transpose() +
+                step * cov_drift_scale_.transpose() + cov_scale_ * step * step.transpose())
+                   .eval();
+  cov_drift_scale_ += cov_scale_ * step;
+  lever_ += T_map_camera.q * lever - T_map_camera_.q * lever;
   T_map_camera_ = T_map_camera;
 }
 
 void SharedError::move(const SE3& T_new_old) {
   T_map_camera_ = T_new_old * T_map_camera_;
-  columns_.topRows<3>() = (T_new_old.R() * columns_.topRows<3>()).eval();
+  Matrix6d turned = Matrix6d::Identity();
+  turned.topLeftCorner<3, 3>() = T_new_old.R();
+  columns_ = (turned * columns_).eval();
+  cov_drift_ = (turned * cov_drift_ * turned.transpose()).eval();
+  cov_drift_scale_ = (turned * cov_drift_scale_).eval();
+  lever_ = (T_new_old.q * lever_).eval();
 }
 
 }  // namespace roadfix
