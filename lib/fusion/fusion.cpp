@@ -104,12 +104,12 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   if (!started_ && !good) return done(FuseStatus::kBadQuality);
   if (!started_) start(s);
 
-  const Before before{now_, seconds_between(t_us_, s.odometry.t_us)};
+  const Before before{now_, seconds_between(t_us_, s.odometry.t_us), combined_variance(imm_, kSpeed)};
   const bool motion_of_ins = s.channel == FusionChannel::kIns && good && memory(s.channel).last;
   advance(s.odometry.t_us, motion_of_ins);
   if (!good) {
     now_ = combine_planar(imm_);
-    follow_local(before, now_);
+    follow_local(before, now_, false);
     memory(s.channel).last.reset();
     if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
     return done(FuseStatus::kBadQuality);
@@ -135,7 +135,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
   const bool ins = s.channel == FusionChannel::kIns;
   const bool placing = ins && !placed_;
   if (placing || config_.scheme == FusionScheme::kLiteral) {
-    follow_local(before, combine_planar(imm_));
+    follow_local(before, combine_planar(imm_), true);
     if (!placing) return fuse_literal(s, report);
     place(s.odometry);
     return FuseStatus::kAccepted;
@@ -144,7 +144,7 @@ FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Bef
   const FuseStatus status = fuse_motion(s, view, report);
   fuse_rates(s, view, !ins && status == FuseStatus::kAccepted);
   const PlanarMixture after = combine_planar(imm_);
-  follow_local(before, after);
+  follow_local(before, after, ins || status == FuseStatus::kAccepted);
   return ins ? fuse_gain(s, view, after.planar, report) : status;
 }
 

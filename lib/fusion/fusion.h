@@ -144,7 +144,8 @@ class Fusion {
   /// The combined estimate at the last sample, as far as the local pose needs it.
   struct Before {
     PlanarMixture at;
-    double dt = 0.0;  ///< s since then
+    double dt = 0.0;              ///< s since then
+    double speed_variance = 0.0;  ///< m2/s2
   };
 
   /// The estimate after a motion that it has not used.
@@ -200,7 +201,8 @@ class Fusion {
   void remember(const ChannelSample& sample, const LevelView& view);
   void move_height(const ChannelSample& sample, const LevelView& view);
   void gain_height(const Odometry& o);
-  void follow_local(const Before& before, const PlanarMixture& now);
+  void follow_local(const Before& before, const PlanarMixture& now, bool told);
+  [[nodiscard]] Eigen::Vector3d leading_velocity() const;
   void update_tie(const ChannelSample& sample);
   void ask_restart(const char* reason);
   void weigh(FusionChannel c, double information);
@@ -253,6 +255,12 @@ class Fusion {
   ReturnState comeback_;
   PlanarEstimate local_;
   LastingVelocity lasting_;  ///< of the local pose
+  double untold_ = 0.0;      ///< s since somebody told the motion; then the poses were:
+  struct {
+    PlanarEstimate local, fused;
+    Planar driven = Planar::Zero();  ///< since, as the speed says
+    double speed_variance = 0.0;
+  } told_;
   double local_height_ = 0.0;
   double local_height_variance_ = 0.0;
 };

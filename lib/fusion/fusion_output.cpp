@@ -13,6 +13,7 @@ using namespace fusion;
 
 namespace {
 
+constexpr double kSpeedSigmas = 3.0;  ///< by which a speed may have been wrong
 constexpr double kClimbsOn = 1.0;     ///< s: a velocity tells the rise of no longer time
 constexpr double kLostSigma = 100.0;  ///< m: nobody should drive by this
 
@@ -20,22 +21,38 @@ constexpr double kLostSigma = 100.0;  ///< m: nobody should drive by this
 
 /// The local pose goes on by the motion from the last posterior to what is known before any absolute pose is used. What
 /// of it the speed cannot explain is hindsight (a turn shows which way the drift went): the local pose leaves it out,
-/// the published one makes it up at its bounded rate.
-void Fusion::follow_local(const Before& before, const PlanarMixture& now) {
-  const Planar& start = before.at.planar.pose;
-  Planar motion = motion_between(start, now.planar.pose);
-  const Planar driven(0.5 * (before.at.speed + now.speed) * before.dt, 0.0, motion.z());
-  const Planar hindsight = motion - driven;
-  if (hindsight.norm() > config_.jump_tolerance) {
-    const Eigen::Vector2d shift = Eigen::Rotation2Dd(start.z()) * hindsight.head<2>();
+/// the published one makes it up at its bounded rate. Steps whose motion nobody `told` yet are guesses, which the next
+/// motion told takes back: pose and covariance go on from the last told one (MODEL.md, section 9).
+void Fusion::follow_local(const Before& before, const PlanarMixture& now, bool told) {
+  if (untold_ <= 0.0) told_ = {local_, before.at.planar, Planar::Zero(), before.speed_variance};
+  untold_ += before.dt;
+  const double turn = motion_between(before.at.planar.pose, now.planar.pose).z();
+  const Planar step(0.5 * (before.at.speed + now.speed) * before.dt, 0.0, turn);
+  told_.driven = after_motion(told_.driven, step);
+  Planar motion = motion_between(told_.fused.pose, now.planar.pose);
+  const Planar hindsight = motion - told_.driven;
+  if (hindsight.norm() > config_.jump_tolerance + kSpeedSigmas * std::sqrt(told_.speed_variance) * untold_) {
+    const Eigen::Vector2d shift = Eigen::Rotation2Dd(told_.fused.pose.z()) * hindsight.head<2>();
     take_fix(comeback_, config_.comeback, {shift.x(), shift.y(), 0.0}, false);
-    motion = driven;
+    motion = told_.driven;
+    told = true;
   }
-  const double yaw = local_.pose.z();
-  local_ = moved_along(local_, before.at.planar, motion, now.planar.P, lasting_.grown(yaw, before.dt));
-  lasting_.carry(
-      yaw, before.dt,
-      {std::min(attitude_.cov_velocity(0, 0), combined_variance(imm_, kSpeed)), attitude_.cov_velocity(1, 1)});
+  const double yaw = told_.local.pose.z();
+  local_ = moved_along(told_.local, told_.fused, motion, now.planar.P, lasting_.grown(yaw, untold_));
+  if (!told) return;
+  lasting_.carry(yaw, untold_, leading_velocity());
+  untold_ = 0.0;
+}
+
+/// Variances of the velocity that leads the poses, along and across, and of the drift of its yaw: of a filter. Others
+/// tell their motion by poses.
+Eigen::Vector3d Fusion::leading_velocity() const {
+  const Memory &ins = memory(FusionChannel::kIns), &vo = memory(FusionChannel::kVo);
+  const bool by_vo = vo.shares_imu && vo.last && !alive(FusionChannel::kIns);
+  if (!by_vo && !(ins.last && alive(FusionChannel::kIns))) return Eigen::Vector3d::Zero();
+  const Eigen::Matrix3d& P = by_vo ? vo.last->cov_velocity : ins.last->cov_velocity;
+  return {std::min(P(0, 0), combined_variance(imm_, kSpeed)), P(1, 1),
+          by_vo ? 0.0 : combined_variance(imm_, kInsDrift)};
 }
 
 /// Height by the channel that speaks for the motion: its own step, with what its covariance grows by. Where another
@@ -128,6 +145,8 @@ void Fusion::visit_members(Self& self, const Visitor& visit) {
   visit(self.comeback_.residual, self.comeback_.fixes_in_row, self.comeback_.resets, self.comeback_.last_jump,
         self.comeback_.height, self.comeback_.last_jump_height);
   visit(self.local_.pose, self.local_.P, self.local_height_, self.local_height_variance_);
+  visit(self.untold_, self.told_.local.pose, self.told_.local.P, self.told_.fused.pose, self.told_.fused.P,
+        self.told_.driven, self.told_.speed_variance);
   LastingVelocity::visit_members(self.lasting_, visit);
 }
 

@@ -192,6 +192,8 @@ bool positive(const Eigen::Matrix3d& S) {
   return S(0, 0) > 0.0 && minor > 0.0 && S(2, 2) * minor + S(2, 0) * a + S(2, 1) * b > 0.0;
 }
 
+Eigen::Matrix3d level_turn(double yaw) { return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix(); }
+
 /// What is less than the floor, direction by direction, is the floor.
 Eigen::Matrix3d at_least(const Eigen::Matrix3d& P, const Eigen::Vector3d& floor_sigma) {
   if (positive(P - Eigen::Matrix3d(floor_sigma.cwiseAbs2().asDiagonal()))) return P;
@@ -212,22 +214,22 @@ Eigen::Matrix3d motion_covariance(const Planar& a, const Eigen::Matrix3d& P_a, c
 }
 
 PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
-                           const Eigen::Matrix3d& P_end, const Eigen::Vector2d& least) {
+                           const Eigen::Matrix3d& P_end, const Eigen::Vector3d& least) {
   Eigen::Matrix3d R = motion_covariance(start.pose, start.P, motion, P_end, Eigen::Vector3d::Constant(kLocalFloor));
-  R.diagonal().head<2>() = R.diagonal().head<2>().cwiseMax(least);
+  R.diagonal() = R.diagonal().cwiseMax(least);
   const double c = std::cos(other.pose.z()), s = std::sin(other.pose.z());
   const Eigen::Vector2d way(c * motion.x() - s * motion.y(), s * motion.x() + c * motion.y());
   return {{other.pose.x() + way.x(), other.pose.y() + way.y(), wrap_angle(other.pose.z() + motion.z())},
           carried_along(other.P, way) + turned(R, c, s)};
 }
 
-Eigen::Vector2d LastingVelocity::grown(double yaw, double dt) const {
-  return dt * (2.0 * (rotation(-yaw) * common_).diagonal() + dt * variances_);
+Eigen::Vector3d LastingVelocity::grown(double yaw, double dt) const {
+  return dt * (2.0 * (level_turn(-yaw) * common_).diagonal() + dt * variances_);
 }
 
-void LastingVelocity::carry(double yaw, double dt, const Eigen::Vector2d& variances) {
-  common_ += dt * rotation(yaw) * variances_.asDiagonal();
-  for (int i = 0; i < 2; ++i)
+void LastingVelocity::carry(double yaw, double dt, const Eigen::Vector3d& variances) {
+  common_ += dt * level_turn(yaw) * variances_.asDiagonal();
+  for (int i = 0; i < 3; ++i)
     if (variances(i) < variances_(i)) common_.col(i) *= variances(i) / variances_(i);
   variances_ = variances;
 }

@@ -66,18 +66,18 @@ struct PlanarEstimate {
   Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
 };
 /// `other`, a pose of the same vehicle in another frame, after the motion that took `start` to a covariance P_end;
-/// along and across the way it loses `least` (m2) at least.
+/// along and across the way and in yaw it loses `least` (m2, rad2) at least.
 PlanarEstimate moved_along(const PlanarEstimate& other, const PlanarEstimate& start, const Planar& motion,
-                           const Eigen::Matrix3d& P_end, const Eigen::Vector2d& least);
+                           const Eigen::Matrix3d& P_end, const Eigen::Vector3d& least);
 
-/// What a pose that is led by velocities has in common with their errors, along and across the vehicle, which last
-/// until the estimator learns (F.16).
+/// What a pose that is led by velocities and a gyro has in common with their errors, along, across and in yaw, which
+/// last until the estimator learns (F.16).
 class LastingVelocity {
  public:
-  /// m2 that the next dt seconds add along and across, if the variances are those of the last carry().
-  [[nodiscard]] Eigen::Vector2d grown(double yaw, double dt) const;
-  /// The next dt seconds, at whose end the velocity has these variances (m2/s2).
-  void carry(double yaw, double dt, const Eigen::Vector2d& variances);
+  /// m2, rad2 that the next dt seconds add along, across and in yaw, if the variances are those of the last carry().
+  [[nodiscard]] Eigen::Vector3d grown(double yaw, double dt) const;
+  /// The next dt seconds, at whose end velocity and yaw rate have these variances (m2/s2, rad2/s2).
+  void carry(double yaw, double dt, const Eigen::Vector3d& variances);
 
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visit) {
@@ -85,8 +85,8 @@ class LastingVelocity {
   }
 
  private:
-  Eigen::Matrix2d common_ = Eigen::Matrix2d::Zero();     ///< m2/s: place in the pose's frame, velocity in the vehicle's
-  Eigen::Vector2d variances_ = Eigen::Vector2d::Zero();  ///< m2/s2
+  Eigen::Matrix3d common_ = Eigen::Matrix3d::Zero();  ///< pose in its frame, velocities in the vehicle's
+  Eigen::Vector3d variances_ = Eigen::Vector3d::Zero();
 };
 
 /// What all lengths and turns of a vision's way have wrong alike, by its calibration.

@@ -47,7 +47,7 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.state_layout = 6;
+    spec_.state_layout = 7;
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0}, {"POSE_INS", "pose_t", 0, 0},
                     {"VO_STATUS", "vo_status_t", 200'000, 0},  {"POSE_VO", "pose_t", 200'000, 0},
                     {"POSE_WHEEL", "pose_t", 50'000, 0},       {"HORIZON_IMM_FUSION", "horizon_t", 0, 0}};

@@ -34,8 +34,8 @@ TEST_CASE("a velocity whose error lasts adds up to what it has in common with th
   constexpr double kYaw = 0.7;
   Eigen::Matrix2d P = Eigen::Vector2d(0.0, 0.04).asDiagonal();  // of place and velocity, along or across
   LastingVelocity lasting;
-  lasting.carry(kYaw, 0.0, {P(1, 1), 4.0 * P(1, 1)});
-  Eigen::Vector2d told = Eigen::Vector2d::Zero();
+  lasting.carry(kYaw, 0.0, {P(1, 1), 4.0 * P(1, 1), 9.0 * P(1, 1)});
+  Eigen::Vector3d told = Eigen::Vector3d::Zero();
   double steps = 0.0;
   for (int i = 0; i < 300; ++i) {
     told += lasting.grown(kYaw, kStep);
@@ -43,25 +43,27 @@ TEST_CASE("a velocity whose error lasts adds up to what it has in common with th
     const Eigen::Matrix2d F = (Eigen::Matrix2d() << 1.0, kStep, 0.0, 1.0).finished();
     P = F * P * F.transpose();
     P(1, 1) += kStep * kWalk;
-    lasting.carry(kYaw, kStep, {P(1, 1), 4.0 * P(1, 1)});
+    lasting.carry(kYaw, kStep, {P(1, 1), 4.0 * P(1, 1), 9.0 * P(1, 1)});
     if (i % 10 != 9) continue;
     const double kept = kMeasured / (P(1, 1) + kMeasured);  // of the velocity's error: the place is not estimated
     P.row(1) *= kept;
     P(0, 1) = P(1, 0);
-    lasting.carry(kYaw, 0.0, {P(1, 1), 4.0 * P(1, 1)});
+    lasting.carry(kYaw, 0.0, {P(1, 1), 4.0 * P(1, 1), 9.0 * P(1, 1)});
   }
   CHECK(told.x() == Approx(P(0, 0)).epsilon(1e-9));
   CHECK(told.y() == Approx(4.0 * P(0, 0)).epsilon(1e-9));
-  CHECK(steps < 0.2 * P(0, 0));  // teeth
+  CHECK(told.z() == Approx(9.0 * P(0, 0)).epsilon(1e-9));  // a yaw by its rate
+  CHECK(steps < 0.2 * P(0, 0));                            // teeth
 }
 
 TEST_CASE("a velocity's error lasts in the vehicle's axes when it turns") {
   LastingVelocity lasting;
-  lasting.carry(0.0, 0.0, {0.04, 0.0});
-  lasting.carry(0.0, 1.0, {0.04, 0.0});
+  lasting.carry(0.0, 0.0, {0.04, 0.0, 0.01});
+  lasting.carry(0.0, 1.0, {0.04, 0.0, 0.01});
   CHECK(lasting.grown(0.0, 1.0).x() == Approx(0.12));  // (2 s)^2 - (1 s)^2
   CHECK(lasting.grown(M_PI_2, 1.0).x() == Approx(0.04));
   CHECK(lasting.grown(M_PI, 1.0).x() == Approx(-0.04));  // comes back
+  CHECK(lasting.grown(M_PI, 1.0).z() == Approx(0.03));   // a yaw does not
 }
 
 TEST_CASE("what a vision's whole way has in common is taken out of its covariance, and no more than is there") {

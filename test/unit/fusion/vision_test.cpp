@@ -234,5 +234,37 @@ TEST_CASE("a vision that is lost twice in a tunnel is told twice where to start 
   CHECK(m.restart_off < 5.0);  // by where the car has come within the picture or two since
 }
 
+/// The local pose half a second after a vision began at 30 m/s, whose first picture does not know its speed. An INS
+/// that is not yet valid splits the steps.
+Odometry begun_at_speed() {
+  constexpr double kSpeed_mps = 30.0;
+  Fusion fusion({});
+  for (int i = 0; i <= 25; ++i) {
+    ChannelSample s;
+    s.odometry.t_us = 1'000'000 + 20'000 * i;
+    fusion.set_gnss(s.odometry.t_us, false);
+    s.odometry.cov_pose = 1e-6 * (1 + i) * Matrix6d::Identity();
+    if (i % 5 == 0) {
+      s.channel = FusionChannel::kVo;
+      s.odometry.validity = Validity::kValid;
+      s.odometry.T_frame_vehicle.p.x() = kSpeed_mps * 0.02 * i;
+      s.odometry.velocity.x() = i > 0 ? kSpeed_mps : 0.0;
+      s.odometry.cov_velocity = (i > 0 ? 0.01 : 1600.0) * Eigen::Matrix3d::Identity();
+    } else {
+      s.channel = FusionChannel::kIns;
+    }
+    (void)fusion.add(s);
+  }
+  return fusion.local();
+}
+
+TEST_CASE("a vision that begins in motion tells the local pose how far it came, and is believed") {
+  const Odometry local = begun_at_speed();
+  const double sigma = std::sqrt(local.cov_pose(0, 0));
+  CHECK(std::abs(local.T_frame_vehicle.p.x() - 15.0) < 3.0 * sigma);
+  CHECK(sigma < 0.3);  // teeth: the guess of the first step alone, whose speed nobody knew, is 2 m
+  CHECK(std::sqrt(local.cov_pose(5, 5)) < 0.01);
+}
+
 }  // namespace
 }  // namespace roadfix
