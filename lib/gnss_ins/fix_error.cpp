@@ -80,11 +80,21 @@ void FixError::move(const Transition& phi, double dt) {
   const double left = left_of(dt), lasts = std::exp(-dt * like_.rate);
   Eigen::Matrix<double, kStates, kSize> moved = phi.decay.asDiagonal() * cross;
   moved.topRows<9>() = phi.moved_by.transpose().lazyProduct(cross.topRows<kInertialStates + 3>());
-  Matrix F = Matrix::Zero();
-  F.diagonal() << left, left, left, 1.0, lasts, lasts, lasts;
-  F.col(kRate).segment<3>(kReturning) = -dt * std::exp(value(kRate)) * left * value.segment<3>(kReturning);
-  cross = moved.lazyProduct(F.transpose());
-  const Matrix half = F.lazyProduct(cov), all = half.lazyProduct(F.transpose());
+  Vector fade;
+  fade << left, left, left, 1.0, lasts, lasts, lasts;
+  // F = diag(fade) but for what the rate does to the returning error: it is sparse.
+  const Eigen::Vector3d by_rate = -dt * std::exp(value(kRate)) * left * value.segment<3>(kReturning);
+  for (int i = 0; i < kSize; ++i) cross.col(i) = fade(i) * moved.col(i);
+  cov = fade.asDiagonal() * cov;
+  if (returning_) {
+    for (int i = 0; i < 3; ++i) {
+      cross.col(kReturning + i) += by_rate(i) * moved.col(kRate);
+      cov.row(kReturning + i) += by_rate(i) * cov.row(kRate);
+    }
+  }
+  Matrix all = cov * fade.asDiagonal();
+  if (returning_)
+    for (int i = 0; i < 3; ++i) all.col(kReturning + i) += by_rate(i) * cov.col(kRate);
   cov = 0.5 * (all + all.transpose());
   if (returning_) cov(kRate, kRate) += kRateWalk * kRateWalk * dt;
   cov.diagonal().segment<3>(kLasting) += (1.0 - lasts * lasts) * variance_;
