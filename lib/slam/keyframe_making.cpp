@@ -21,6 +21,7 @@ constexpr double kFoundMemory = 0.8;  ///< how much of the share found after key
 constexpr double kNoiseFlow = 1.67;   ///< sigmas: Rayleigh's median times root 2, a flow that is noise alone
 constexpr double kMedianNoise = 1.77;    ///< of the middle of n shifts between two sightings, times sigma / sqrt(n)
 constexpr double kWalkInMean = 3.0;      ///< a walk's variance at its end over that of its mean
+constexpr double kLongestPull = 2.0;     ///< m: a fifth of the depth that (M.7b) thinks of
 constexpr double kStandingDepth = 10.0;  ///< m, of what is seen: how far a car may have crept by so little flow
 
 std::vector<double> lengths_of(const std::vector<Eigen::Vector2d>& shifts) {
@@ -127,6 +128,7 @@ bool KeyframeTracker::pull_away(const CameraFrame& frame, const std::vector<Feat
   const auto told = travelled(from.t_us, frame.t_us);
   const bool mono_with_scale = !stereo_ && scale_ != ScaleSource::kNone;
   if (!mono_with_scale || !told || out_.num_landmarks_seen >= config_.min_inliers) return false;
+  if (told->travel.distance > kLongestPull) return false;
   std::vector<size_t> index;
   std::vector<Eigen::Vector2d> first, second;
   for (size_t i = 0; i < features.size(); ++i) {

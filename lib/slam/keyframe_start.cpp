@@ -8,8 +8,10 @@
 namespace roadfix {
 namespace {
 
-constexpr double kUnseen = 1.5;    ///< m/s2, as in travel.cpp: what a car's speed changes by unseen
-constexpr double kNearFlow = 2.0;  ///< start flows by which tracks have moved that alone are enough to begin
+constexpr double kUnseen = 1.5;       ///< m/s2, as in travel.cpp: what a car's speed changes by unseen
+constexpr double kFastestBack = 5.0;  ///< m/s: nobody reverses faster
+constexpr double kClearly = 0.5;      ///< cosine: of a camera whose mounting is not known too badly
+constexpr double kNearFlow = 2.0;     ///< start flows by which tracks have moved that alone are enough to begin
 
 }  // namespace
 
@@ -165,12 +167,16 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   const auto motion = two_view_motion(pairs.first, pairs.second, config);
   if (!motion) return;
   double baseline = 1.0;  // a unit of our own
+  const double dt_s = seconds_between(start_->t_us, frame.t_us);
   const auto known = camera_travelled(start_->t_us, SE3{}, frame.t_us, motion->T_first_second);
+  // Posts and lane marks that are taken for each other go backwards; a car as fast as that does not.
+  const Eigen::Vector3d ahead = rig_.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitX();
+  const bool forwards = known && !known->travel.backwards && known->travel.distance > kFastestBack * dt_s;
+  if (forwards && motion->T_first_second.p.dot(ahead) < -kClearly) return;
   if (known) {
     baseline = std::max(0.01, known->travel.distance);
     name_scale(*known);
   } else if (motion_ && motion_->dt_s > 0.0) {  // as fast as before the map was lost, or pulling away
-    const double dt_s = seconds_between(start_->t_us, frame.t_us);
     baseline = std::max({0.01, motion_->T_before_now.p.norm() / motion_->dt_s * dt_s, 0.5 * kUnseen * dt_s * dt_s});
   }
   std::vector<KeyframeFeature> first, second;
@@ -206,8 +212,7 @@ void KeyframeTracker::finish_start(const CameraFrame& frame, const Pairs& pairs)
   cov_window_.setZero();
   begin_bundle();
   finish_bundle();
-  const FrameMotion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_,
-                          seconds_between(start_->t_us, frame.t_us)};
+  const FrameMotion going{map_.keyframes().front().T_map_camera.inverse() * T_map_camera_, dt_s};
   start_.reset();
   // The mean of what may have been seconds: a car that pulls away is faster at their end.
   Matrix6d cov_going = cov_own_;

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "fed_tracker.h"
+#include "geometry/so3.h"
 
 namespace roadfix {
 namespace {
@@ -87,6 +88,67 @@ TEST_CASE("mono keeps its pose and its scale where most of what it sees is far a
       CHECK(std::abs(seen.length_ratio - 1.0) < 0.2);
     }
   }
+}
+
+constexpr int kBackFrames = kFrames - 20;  // there are points ahead of where they begin
+
+/// Valid poses of a motorway whose pictures come in the order of a car that backs, while it is told to go at `speed`.
+int valid_backwards(double speed) {
+  ScenarioConfig scenario = test::shortened("highway", 20.0);
+  test::FedTracker tracker(test::exact_lens(), scenario, false);
+  Motorway motorway(Camera(intrinsics_of(scenario.camera)), 60, 0.0);
+  int valid = 0;
+  for (int i = 0; i < kBackFrames; ++i) {
+    const int64_t t_us = 100'000 * (i + 1);
+    tracker->speed({t_us, SpeedSource::kWheels, speed, 0.05, 0.01});
+    const TrackedFrame& out = tracker.process(t_us, motorway.observe(kStep * (kBackFrames - i)));
+    valid += out.odometry.validity == Validity::kValid ? 1 : 0;
+  }
+  return valid;
+}
+
+TEST_CASE("a start that goes backwards at a speed at which nobody does is none") {
+  CHECK(valid_backwards(10.0 * kStep) == 0);
+  CHECK(valid_backwards(-10.0 * kStep) > kBackFrames / 2);  // teeth: told that it backs, it may
+}
+
+/// The largest turn (rad) of a valid pose after a truck, which has been alongside, has come to fill the picture and
+/// slides through it; the car goes on, or `stops` by what it tells.
+double turned_by_truck(bool stops) {
+  constexpr int kAlongside = 50, kFills = 60, kEnd = 66, kTracks = 60;
+  constexpr double kSlide = 15.0;  // px a frame
+  ScenarioConfig scenario = test::shortened("highway", 20.0);
+  test::FedTracker tracker(test::exact_lens(), scenario, false);
+  const Camera camera(intrinsics_of(scenario.camera));
+  Motorway motorway(camera, 60, 0.0);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> across(150.0, 1000.0), down(120.0, 300.0);
+  std::vector<TrackObservation> truck(kTracks);
+  for (int i = 0; i < kTracks; ++i) {
+    truck[static_cast<size_t>(i)].id = 1'000'000 + i;
+    truck[static_cast<size_t>(i)].left = {across(random), down(random)};
+  }
+  double turn = 0.0;
+  for (int i = 0; i < kEnd; ++i) {
+    const int64_t t_us = 100'000 * (i + 1);
+    const bool fills = i >= kFills;
+    tracker->speed({t_us, SpeedSource::kWheels, fills && stops ? 0.5 : 10.0 * kStep, 0.05, 0.01});
+    std::vector<TrackObservation> seen;
+    if (!fills) seen = motorway.observe(kStep * i);
+    for (TrackObservation& o : truck) {
+      o.left.x() += fills ? kSlide : 0.0;
+      if (i >= kAlongside && camera.sees(o.left)) seen.push_back(o);
+    }
+    const TrackedFrame& out = tracker.process(t_us, seen);
+    if (fills && out.odometry.validity == Validity::kValid && out.reset_counter == 0)
+      turn = std::max(turn, log_q(out.odometry.T_frame_vehicle.q).norm());
+  }
+  return turn;
+}
+
+TEST_CASE("a truck that slides through the picture of a fast car is no turn of it") {
+  CHECK(turned_by_truck(false) < 0.01);
+  CHECK(turned_by_truck(true) > 0.02);  // teeth: who has hardly moved has turned
 }
 
 }  // namespace
