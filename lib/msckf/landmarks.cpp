@@ -104,9 +104,7 @@ bool PointUpdate::use_landmarks(State& state, const SeenFrame& frame) {
         const Linear linear = sighting_of(state, landmark, *point);
         const double nis = linear.nis(state);
         fits = nis <= gate_[static_cast<size_t>(linear.rows())];
-        counts_.nis_sum += nis;
-        counts_.dof_sum += linear.rows();
-        fits ? ++counts_.used : ++counts_.refused;
+        counts_.add(fits, nis, linear.rows());
         if (fits) update_.add(linear);
       }
     }

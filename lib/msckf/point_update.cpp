@@ -99,10 +99,8 @@ bool PointUpdate::gate(int first_row, int rows) {
   auto s = r.head(rows);
   if (llt.info() == Eigen::Success) llt.matrixL().solveInPlace(s);
   const double nis = s.squaredNorm();
-  counts_.nis_sum += nis;
-  counts_.dof_sum += rows;
   const bool fits = llt.info() == Eigen::Success && nis <= gate_[static_cast<size_t>(rows)];
-  fits ? ++counts_.used : ++counts_.refused;
+  counts_.add(fits, nis, static_cast<int>(rows));
   return fits;
 }
 

@@ -15,8 +15,14 @@ struct PointCounts {
   int used = 0;
   int refused = 0;       ///< by the gate
   int not_placed = 0;    ///< no triangulation
-  double nis_sum = 0.0;  ///< of used and refused points
-  int dof_sum = 0;
+  double nis_sum = 0.0;  ///< of used points
+  int dof_sum = 0;       ///< likewise
+
+  void add(bool fits, double nis, int dof) {
+    fits ? ++used : ++refused;
+    nis_sum += fits ? nis : 0.0;
+    dof_sum += fits ? dof : 0;
+  }
 };
 
 class PointUpdate {

@@ -35,20 +35,6 @@ int8_t pose_state(TrackState state) {
   return pose_t::STATE_LOST;
 }
 
-const char* name_of(FrontEndKind kind) {
-  switch (kind) {
-    case FrontEndKind::kOrb:
-      return "orb";
-    case FrontEndKind::kSift:
-      return "sift";
-    case FrontEndKind::kSuperPoint:
-      return "superpoint";
-    case FrontEndKind::kKlt:
-      break;
-  }
-  return "klt";
-}
-
 }  // namespace
 
 void set_reset(int counter, const SE3& delta, pose_t& m) {
@@ -76,6 +62,20 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
   pose_t m = vo_pose(frame, closed, origin);
   set_reset(frame.closed_reset_counter, frame.closed_reset_delta, m);
   return m;
+}
+
+const char* name_of(FrontEndKind kind) {
+  switch (kind) {
+    case FrontEndKind::kOrb:
+      return "orb";
+    case FrontEndKind::kSift:
+      return "sift";
+    case FrontEndKind::kSuperPoint:
+      return "superpoint";
+    case FrontEndKind::kKlt:
+      break;
+  }
+  return "klt";
 }
 
 vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end) {

@@ -15,6 +15,9 @@ pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin o
 /// The pose with all loops closed, with resets of its own.
 pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOrigin origin);
 /// `shared`: of the pose told beside it.
+/// As in the configuration and in VO_STATUS.
+const char* name_of(FrontEndKind kind);
+
 vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end);
 vo_features_t vo_features(const TrackedFrame& frame);
 

@@ -188,7 +188,7 @@ void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
                                                       : vo_status_t::STATE_WEAK;
   status.reason = note_.empty() ? out.reason : note_;
   note_.clear();
-  status.front_end = "klt";
+  status.front_end = name_of(config_.msckf.front_end.kind);
   status.scale_source = scale_source(out.scale);
   const double speed = out.odometry.velocity.norm();
   status.scale_std = speed > 0.1 ? std::sqrt(out.odometry.cov_velocity(0, 0)) / speed : 0.0;

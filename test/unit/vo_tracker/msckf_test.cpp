@@ -79,9 +79,9 @@ VoTrackerConfig config() {
   return c;
 }
 
-Collector run(const std::vector<Sent>& messages) {
+Collector run(const std::vector<Sent>& messages, const VoTrackerConfig& with = config()) {
   Collector sink;
-  StageRunner runner(make_vo_tracker(calibration(), config()), sink);
+  StageRunner runner(make_vo_tracker(calibration(), with), sink);
   for (const Sent& m : messages) feed(runner, m);
   return sink;
 }
@@ -135,7 +135,24 @@ TEST_CASE("mode msckf: valid while parked, then follows the street") {
   CHECK(statuses.back().mode == vo_status_t::MODE_MSCKF);
   CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
   CHECK(statuses.back().scale_source == vo_status_t::SCALE_FROM_IMU);
+  CHECK(statuses.back().front_end == "klt");
   CHECK(out.messages.at("VO_FEATURES").size() == statuses.size());
+}
+
+TEST_CASE("mode msckf: the status names the front end, and its residuals are those of what is used") {
+  VoTrackerConfig orb = config();
+  orb.msckf.front_end.kind = FrontEndKind::kOrb;
+  orb.msckf.tuning.window.sigma_px = 0.2;  // far less than what the corners of ORB scatter by
+  const auto statuses = run(drive(0), orb).all<vo_status_t>("VO_STATUS");
+  REQUIRE(!statuses.empty());
+  CHECK(statuses.back().front_end == "orb");
+  int refusing = 0;
+  for (const vo_status_t& s : statuses) {
+    refusing += s.num_inliers > 0 && s.inlier_ratio < 0.9 ? 1 : 0;
+    // A gate of 95 % lets a residual of 2 sigma in, not the 10 of a wrong match.
+    CHECK(s.reprojection_rms_px <= 2.0 * orb.msckf.tuning.window.sigma_px);
+  }
+  CHECK(refusing > 0);
 }
 
 TEST_CASE("mode msckf: pictures may come late, and a snapshot goes on with the same bytes") {
