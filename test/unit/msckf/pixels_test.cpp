@@ -138,7 +138,7 @@ TEST_CASE("errors on three filmed drives are what the covariance says, and too m
   test::VisualDriveConfig car = test::city_drive(kDuration);
   car.scenario.camera = with_size(car.scenario.camera, kWidth, kHeight);
   car.scenario.camera.layout = CameraLayout::kMono;
-  // An even road without slip: over more drives the claim is too small on any, by 1.9 to 2.5 (MODEL.md, "Consistency").
+  // An even road without slip: over more drives the claim is too small on any, by 1.9 to 2.5 (EVIDENCE.md, E9).
   car.scenario.motion.road_roughness_m3 = car.scenario.motion.rear_slip_rad_per_mps2 = 0.0;
   Outcome honest, turned, bold;
   for (uint64_t seed = 1; seed <= kDrives; ++seed) {
