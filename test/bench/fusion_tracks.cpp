@@ -27,7 +27,7 @@ namespace roadfix {
 namespace {
 
 /// As far off as patches are that are followed through drawn pictures: tracks differ, and the tracker loses as much
-/// (scripts/drift, tunnel_lit, stereo, in pictures and here; MODEL.md of lib/slam).
+/// (scripts/drift, tunnel_lit, stereo, in pictures and here; lib/slam/EVIDENCE.md, section 5).
 TrackConfig as_in_pictures() {
   TrackConfig tracks;
   tracks.noise_px = 0.34;
