@@ -51,7 +51,7 @@ BundleReport two_views(bool stands, const StandingDoubt& doubt, SE3& T_later) {
   problem.lens_information *= 1e12;
   problem.views = {{SE3{}, true}, {T_later, false}, {T_later, false}};
   if (stands) problem.standings = {{0, 1, doubt}, {1, 2, doubt}};
-  const BundleReport report = adjust(problem, 10);
+  BundleReport report = adjust(problem, 10);
   T_later = problem.views.back().T_map_camera;
   return report;
 }
