@@ -68,4 +68,19 @@ inline ScenarioConfig shortened(const std::string& name, double duration_s) {
   return config;
 }
 
+/// A drive of one eye whose tracks err as followed patches do, which differ.
+inline TrackDrive patches_of_one_eye(const std::string& name, double duration_s, uint64_t seed) {
+  ScenarioConfig scenario = shortened(name, duration_s);
+  scenario.camera.layout = CameraLayout::kMono;
+  TrackConfig tracks;
+  tracks.noise_px = 0.34;
+  tracks.noise_spread = 0.95;
+  return make_track_drive(scenario, seed, tracks);
+}
+
+/// Of the rear wheels, which tell the direction.
+inline SpeedSample signed_speed(const WheelSample& w) {
+  return {w.t_us, SpeedSource::kWheels, 0.5 * (w.speeds[2] + w.speeds[3]), 0.03, 0.01};
+}
+
 }  // namespace roadfix::test

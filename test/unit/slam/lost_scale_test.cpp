@@ -17,18 +17,12 @@ struct Told {
 };
 
 std::vector<Told> drive(const char* name, double duration_s, uint64_t seed, bool wheels) {
-  ScenarioConfig scenario = test::shortened(name, duration_s);
-  scenario.camera.layout = CameraLayout::kMono;
-  TrackConfig tracks;
-  tracks.noise_px = 0.34;  // as patches are followed, which differ
-  tracks.noise_spread = 0.95;
-  const test::TrackDrive d = test::make_track_drive(scenario, seed, tracks);
+  const test::TrackDrive d = test::patches_of_one_eye(name, duration_s, seed);
   test::FedTracker tracker(test::exact_lens(), d.drive.config, false);
   std::vector<Told> told;
   for (const auto& event : d.events) {
     const auto* w = std::get_if<WheelSample>(&event);
-    if (w != nullptr && wheels)
-      tracker->speed({w->t_us, SpeedSource::kWheels, 0.5 * (w->speeds[2] + w->speeds[3]), 0.03, 0.01});
+    if (w != nullptr && wheels) tracker->speed(test::signed_speed(*w));
     const auto* frame = std::get_if<test::TrackFrame>(&event);
     if (frame == nullptr) continue;
     const TrackedFrame& out = tracker.process(frame->t_us, frame->tracks);

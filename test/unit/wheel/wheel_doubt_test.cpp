@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "drive.h"
-#include "geometry/frames.h"
 #include "simulation/scenarios.h"
 
 namespace roadfix {
