@@ -41,7 +41,8 @@ void Health::undecodable(const std::string& name, int64_t now_us, const std::str
 void Health::unusable(const std::string& name, int64_t now_us) { channel(name).unusable(now_us); }
 
 void Health::heartbeat(const std::string& process, int64_t now_us, const HeartbeatFacts& facts) {
-  processes_.try_emplace(process, process, config_.process).first->second.heartbeat(now_us, facts);
+  const bool several = std::ranges::count(expectations_.several, process) > 0;
+  processes_.try_emplace(process, process, config_.process, false, several).first->second.heartbeat(now_us, facts);
 }
 
 void Health::to_common_frame(PoseFacts& facts) {

@@ -72,6 +72,7 @@ struct ExpectedChannel {
 struct Expectations {
   std::vector<ExpectedChannel> channels;
   std::vector<std::string> processes;
+  std::vector<std::string> several = {"monitor"};  ///< may run more than once side by side: who only looks
   /// The estimate that the verdict is about: the first of these that was ever heard.
   std::vector<std::string> judged_poses = {"POSE_FUSED", "POSE_INS"};
 };

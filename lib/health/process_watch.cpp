@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace roadfix {
 
@@ -20,9 +21,7 @@ double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
 
 void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
   if (newest_ && newest_->run != facts.run) {
-    ++restarts_;
-    restarted_.add(now_us);
-    intervals_us_.clear();
+    change_run(now_us, facts.run);
   } else if (newest_ && facts.kernel_drops > newest_->kernel_drops) {
     drops_.add(now_us, facts.kernel_drops - newest_->kernel_drops);
   }
@@ -33,6 +32,19 @@ void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
   if (!newest_ || newest_->run != facts.run) first_us_ = now_us;
   newest_ = facts;
   now_us_ = now_us;
+}
+
+/// One new run is a restart; going back and forth between two is two that live, both heard in every period.
+void ProcessWatch::change_run(int64_t now_us, int64_t run) {
+  intervals_us_.clear();
+  const int64_t left = std::exchange(previous_run_, newest_->run);
+  if (several_) return;
+  if (run == left) {
+    back_and_forth_.add(now_us);
+  } else {
+    ++restarts_;
+    restarted_.add(now_us);
+  }
 }
 
 /// A process that beats fast is missed soon: by the longest of its last intervals, so that an early one says nothing.
@@ -65,6 +77,7 @@ void ProcessWatch::judge(int64_t now_us, int64_t start_us, std::vector<Condition
         condition("silent", fmt::format("has shown no sign of life for {:.0f} s", seconds(now_us - now_us_))));
     return;
   }
+  if (back_and_forth_.within(now_us) > 0) out.push_back(condition("twice", "runs twice at once: end one of the two"));
   if (restarted_.within(now_us) > 0) out.push_back(condition("restarted", "was started anew"));
   if (newest_->state == ProcessState::kNoClock)
     out.push_back(condition("no_clock", "stands still: " + newest_->reason));

@@ -38,8 +38,9 @@ struct ProcessReport {
 class ProcessWatch {
  public:
   /// `expected`: the vehicle has it; another one is missed only once it has shown that it lives.
-  ProcessWatch(const std::string& name, const ProcessLimits& limits, bool expected = false)
-      : name_(name), limits_(limits), expected_(expected) {}
+  /// `several`: it may run more than once side by side.
+  ProcessWatch(const std::string& name, const ProcessLimits& limits, bool expected = false, bool several = false)
+      : name_(name), limits_(limits), expected_(expected), several_(several) {}
 
   void heartbeat(int64_t now_us, const HeartbeatFacts& facts);
   void judge(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const;
@@ -50,16 +51,18 @@ class ProcessWatch {
   [[nodiscard]] double silent_after() const;
   [[nodiscard]] Condition condition(const std::string& what, const std::string& text) const;
   void judge_load(int64_t now_us, std::vector<Condition>& out) const;
+  void change_run(int64_t now_us, int64_t run);
 
   std::string name_;
   ProcessLimits limits_;
-  bool expected_;
+  bool expected_, several_;
   std::optional<HeartbeatFacts> newest_;
   int64_t first_us_ = 0;  ///< of this run
   int64_t now_us_ = 0;
+  int64_t previous_run_ = 0;
   std::deque<int64_t> intervals_us_;  ///< between the last few heartbeats
   int restarts_ = 0;
-  Recent drops_, restarted_;
+  Recent drops_, restarted_, back_and_forth_;
 };
 
 }  // namespace roadfix

@@ -28,3 +28,28 @@ TEST_CASE("the rate of a channel is that of its messages, and nought once it is 
   CHECK(watch.report(test::at(4.95), 0).rate_hz == Approx(10.0).epsilon(0.02));
   CHECK(watch.report(test::at(9.0), 0).rate_hz == 0.0);
 }
+
+TEST_CASE("two processes under one name are told from a restart; monitors may look side by side") {
+  const auto told = [](const std::string& process, int both) {
+    Health health(HealthConfig{}, Expectations{});
+    std::string all;
+    HeartbeatFacts beat;
+    beat.state = ProcessState::kRunning;
+    for (int i = 0; i < 100; ++i) {
+      const double t = 0.1 * i;
+      beat.run = i < 30 ? 1 : 2;
+      if (i % 10 == 0) health.heartbeat(process, test::at(t), beat);
+      beat.run = 1;
+      if (i % 10 == 5 && i >= 30 && i < both) health.heartbeat(process, test::at(t), beat);  // the older one lives on
+      while (const auto due = health.next_decision(test::at(t))) health.decide(*due);
+      for (const Condition& reason : health.report().reasons) {
+        if (reason.key.starts_with("process.") && all.find(reason.text) == std::string::npos) all += reason.text + "\n";
+      }
+    }
+    return all;
+  };
+  CHECK(told("gnss_ins_ekf", 30) == "gnss_ins_ekf was started anew\n");
+  CHECK(told("gnss_ins_ekf", 100) ==
+        "gnss_ins_ekf was started anew\ngnss_ins_ekf runs twice at once: end one of the two\n");
+  CHECK(told("monitor", 100).empty());
+}
