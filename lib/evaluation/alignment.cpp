@@ -88,13 +88,27 @@ std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment al
   return align_umeyama(m, alignment == Alignment::kSim3);
 }
 
-Similarity tie(const PosePair& pair) {
-  const SE3& estimate = pair.estimate.T_frame_vehicle;
-  const SE3& reference = pair.reference.T_frame_vehicle;
+namespace {
+
+Similarity turned_onto(const PosePair& pair, double yaw) {
   Similarity S;
-  S.T.q = exp_q(Eigen::Vector3d(0.0, 0.0, yaw_of(reference.q) - yaw_of(estimate.q)));
-  S.T.p = reference.p - S.T.q * estimate.p;
+  S.T.q = exp_q(Eigen::Vector3d(0.0, 0.0, yaw));
+  S.T.p = pair.reference.T_frame_vehicle.p - S.T.q * pair.estimate.T_frame_vehicle.p;
   return S;
+}
+
+}  // namespace
+
+Similarity tie(const PosePair& pair) {
+  return turned_onto(pair, yaw_of(pair.reference.T_frame_vehicle.q) - yaw_of(pair.estimate.T_frame_vehicle.q));
+}
+
+Similarity tie_by_way(const PosePair& from, const PosePair& to) {
+  const auto direction = [](const Odometry& a, const Odometry& b) {
+    const Eigen::Vector3d way = b.T_frame_vehicle.p - a.T_frame_vehicle.p;
+    return std::atan2(way.y(), way.x());
+  };
+  return turned_onto(from, direction(from.reference, to.reference) - direction(from.estimate, to.estimate));
 }
 
 Odometry transformed(const Similarity& S, const Odometry& pose) {

@@ -10,6 +10,7 @@ constexpr double kDelayStep_s = 0.05;
 constexpr int kDelaySteps = 40;  ///< to either side
 constexpr double kDelayPrecision_s = 1e-4;
 constexpr int64_t kPathInterval_us = 100'000;
+constexpr double kWayOfTie = 50.0;  // m
 
 /// Whether the reference may be scored at a time: both its neighbours may.
 class ScoreMask {
@@ -119,14 +120,37 @@ std::optional<Similarity> chosen_similarity(const ChannelScore& report, const Dr
   return tie(tie_pair(report.scored, facts, options));
 }
 
+double level_way(const PosePair& from, const PosePair& to) {
+  return (to.reference.T_frame_vehicle.p - from.reference.T_frame_vehicle.p).head<2>().norm();
+}
+
+/// Ties the pairs to a reference without attitude by the first 50 m of way; what the reference's own error makes of yaw
+/// and place is added to the covariance. Nothing where the drive is shorter.
+std::vector<PosePair> tied_by_way(std::vector<PosePair> pairs, const std::vector<PosePair>& all, double sigma) {
+  const PosePair& start = all.front();
+  const auto to = std::ranges::find_if(all, [&](const PosePair& p) { return level_way(start, p) >= kWayOfTie; });
+  if (to == all.end()) return {};
+  transform_estimates(tie_by_way(start, *to), pairs);
+  const double yaw_sigma = std::sqrt(2.0) * sigma / level_way(start, *to);
+  for (PosePair& pair : pairs) {
+    const Eigen::Vector3d way = pair.estimate.T_frame_vehicle.p - start.reference.T_frame_vehicle.p;
+    const Eigen::Vector3d turned = Eigen::Vector3d::UnitZ().cross(way) * yaw_sigma;
+    pair.estimate.cov_pose.topLeftCorner<3, 3>() += turned * turned.transpose();
+    pair.estimate.cov_pose.topLeftCorner<3, 3>().diagonal().array() += sigma * sigma;
+  }
+  return pairs;
+}
+
 /// The scored pairs as the published covariance means them. An odometry's covariance grows from its own start, so it is
 /// tied to the reference there; the alignment over the whole drive would spread errors to where none are claimed.
+/// Nothing where it cannot be tied.
 std::vector<PosePair> honest_pairs(const ChannelScore& report, const std::vector<PosePair>& unaligned,
                                    const Reference& reference, const DriveFacts& facts, const EstimateInput& estimate,
                                    const ReferenceKind& kind) {
-  if (!estimate.local_frame || estimate.scale_unknown || !kind.attitude) return report.scored;
+  if (!estimate.local_frame || estimate.scale_unknown) return report.scored;
   const auto all = associate(estimate.trajectory, reference.trajectory, facts.reference.from_fixes);
   if (all.empty()) return report.scored;
+  if (!kind.attitude) return tied_by_way(unaligned, all, facts.reference.sigma_m);
   std::vector<PosePair> tied = unaligned;
   transform_estimates(tie(all.front()), tied);
   return tied;
@@ -227,7 +251,7 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
   if (!report.scored.empty()) {
     const auto honest = honest_pairs(report, unaligned, reference, facts, estimate, kind);
     report.honesty = honesty(honest, kind, facts.reference.sigma_m);
-    report.sigmas = sigma_samples(honest, kind, facts.reference.sigma_m);
+    report.sigmas = sigma_samples(honest.empty() ? report.scored : honest, kind, facts.reference.sigma_m);
   }
   align_in_place(estimate.trajectory, report.similarity, report.delay_s);
   measure_outages(report, reference, facts, estimate.trajectory, kind);

@@ -82,7 +82,8 @@ struct ChannelScore {
   std::optional<double> tse_m;
   std::optional<Reconvergence> rct;
   std::optional<ModeAccuracy> modes;
-  Honesty honesty;  ///< of an estimate in its own frame: tied to the reference at its start, whatever the alignment
+  Honesty honesty;  ///< of an estimate in its own frame: tied to the reference at its start, whatever the alignment;
+                    ///< empty where the reference has neither attitude nor way enough for that
   Availability availability;
   std::optional<Summary> latency;  ///< s
 

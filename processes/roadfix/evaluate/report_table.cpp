@@ -43,6 +43,7 @@ std::string honesty_row(const std::string& name, const HonestyRow& r, double uni
 }
 
 std::string honesty_rows(const Honesty& h) {
+  if (h.position.samples == 0 && h.position.unusable == 0) return "  covariance: not judged, no 50 m from the start\n";
   if (h.position.samples == 0) return "  covariance: none that is positive definite\n";
   std::string text =
       fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "covariance", "NEES/dof", "error", "sigma", "in 3 s");

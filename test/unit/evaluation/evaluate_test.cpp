@@ -159,6 +159,32 @@ TEST_CASE("an odometry's covariance is judged from its own start") {
   CHECK(evaluate_channel(exact_reference(), exact_facts(), estimate, aligned).honesty.position.nees_per_dof > 100.0);
 }
 
+TEST_CASE("an odometry's covariance is judged from its own start by a reference without attitude, too") {
+  // Yaw drifts by 0.002 deg a second and is claimed so; the first 50 m cost a hundredth of a degree.
+  const auto judged = [](double claimed, double sigma, double end_s) {
+    auto estimate = estimate_of(changed(eight_trajectory(0.0, end_s, 0.1), [&](Odometry& pose) {
+      const double turned = 3.5e-5 * seconds_between(0, pose.t_us);
+      const Eigen::Vector3d p = pose.T_frame_vehicle.p - test::eight(0.0).T_frame_vehicle.p;
+      pose.T_frame_vehicle = SE3{exp_q({0, 0, 1.0 + turned}), {50.0, 60.0, -7.0}} * pose.T_frame_vehicle;
+      const Eigen::Vector3d J = Eigen::Vector3d::UnitZ().cross(exp_q({0, 0, 1.0}) * p) * (claimed * turned);
+      pose.cov_pose.topLeftCorner<3, 3>() = J * J.transpose() + 1e-3 * Eigen::Matrix3d::Identity();
+    }));
+    estimate.local_frame = true;
+    DriveFacts facts = exact_facts();
+    facts.reference = {ReferenceOf::kImu, false, false, false, sigma};
+    Reference reference = exact_reference();
+    reference.trajectory.has_attitude = false;
+    return evaluate_channel(reference, facts, estimate, {}).honesty.position;
+  };
+  const HonestyRow honest = judged(1.0, 0.0, 200.0);
+  CHECK(honest.samples > 1900);
+  CHECK(honest.nees_per_dof < 1.0);
+  CHECK(honest.within_3sigma == Approx(1.0));
+  CHECK(judged(0.1, 0.0, 200.0).nees_per_dof > 10.0);                          // teeth
+  CHECK(judged(0.1, 0.5, 200.0).nees_per_dof < 1.0);                           // nobody can know with such a reference
+  CHECK(judged(1.0, 0.0, 3.0).samples + judged(1.0, 0.0, 3.0).unusable == 0);  // too short to be tied
+}
+
 TEST_CASE("a constant latency of the reference is found where it is asked for") {
   Reference reference = exact_reference(1.0);
   for (Odometry& pose : reference.trajectory.poses) pose.t_us += 430'000;
