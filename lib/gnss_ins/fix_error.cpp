@@ -63,9 +63,10 @@ void FixError::rescale_lasting(double ratio, NavState& x, ErrorMatrix& P) {
     const double more = (ratio - 1.0) / variance, shift = std::min(more, 0.0) * value(i);
     dx += shift * with_state;
     value += shift * with_error;
-    P += (more * with_state) * with_state.transpose();
+    // In this order an element and its mirror are rounded alike.
+    P += more * (with_state * with_state.transpose()).eval();
     cross += (more * with_state) * with_error.transpose();
-    cov += (more * with_error) * with_error.transpose();
+    cov += more * (with_error * with_error.transpose()).eval();
   }
   x = retract(x, dx);
 }

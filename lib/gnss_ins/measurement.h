@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "gnss_ins/fix_error.h"
 
@@ -45,6 +46,16 @@ struct AidingRecord {
   std::array<double, 3> innovation_variance{};
   double log_likelihood = 0.0;  ///< of the innovation, without the constant
 };
+
+/// P -= Y Y', (M.20). An element and its mirror are the same sum of the same products, rounded alike: no product is
+/// fused into the sum, because that is done where a whole register is filled, and the last rows do not fill one.
+template <int Size, int Rows>
+void subtract_square(Eigen::Matrix<double, Size, Size>& P, const Eigen::Matrix<double, Size, Rows>& Y) {
+  const auto subtract = [&]<int... Row>(std::integer_sequence<int, Row...>) {
+    for (int j = 0; j < Size; ++j) P.col(j) -= ((Y(j, Row) * Y.col(Row)) + ...);
+  };
+  subtract(std::make_integer_sequence<int, Rows>());
+}
 
 /// Neighbouring states.
 struct StateRange {
@@ -102,9 +113,8 @@ class Innovation {
     usable = std::isfinite(nis);
   }
 
-  /// Kalman update in the symmetric form P -= Y Y', Y = P H' L^-T with S = L L' (M.20): every element and its mirror
-  /// are the same sum of the same products. `considered` states keep value and variance, but their uncertainty counts
-  /// (Schmidt 1966).
+  /// Kalman update in the symmetric form P -= Y Y', Y = P H' L^-T with S = L L' (M.20). `considered` states keep value
+  /// and variance, but their uncertainty counts (Schmidt 1966).
   void apply(NavState& x, ErrorMatrix& P, FixError& error, const StateRange& considered) const {
     Eigen::Matrix<double, kStates, Rows> Y;
     for (int i = 0; i < Rows; ++i) {
@@ -114,10 +124,10 @@ class Innovation {
     }
     ErrorVector dx = Y.lazyProduct(whitened_);
     if (considered.size == 0) {
-      subtract(P, Y);
+      subtract_square(P, Y);
     } else {
       const ErrorMatrix before = P;
-      subtract(P, Y);
+      subtract_square(P, Y);
       dx.segment(considered.first, considered.size).setZero();
       P.block(considered.first, considered.first, considered.size, considered.size) =
           before.block(considered.first, considered.first, considered.size, considered.size);
@@ -159,11 +169,7 @@ class Innovation {
     }
     error.value += Z.lazyProduct(whitened_);
     error.cross -= Y.lazyProduct(Z.transpose());
-    error.cov -= Z.lazyProduct(Z.transpose());
-  }
-
-  static void subtract(ErrorMatrix& P, const Eigen::Matrix<double, kStates, Rows>& Y) {
-    for (int j = 0; j < kStates; ++j) P.col(j) -= Y.lazyProduct(Y.row(j).transpose());
+    subtract_square(error.cov, Z);
   }
 
   // S = L L'; false where S is not positive definite.
