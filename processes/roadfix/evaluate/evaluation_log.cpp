@@ -45,7 +45,8 @@ bool finite(const Odometry& pose) {
 
 void transform(const SE3& T, Odometry& pose) { pose = transformed({1.0, T}, pose); }
 
-/// Collects one channel; poses of a frame other than the last one's are dropped when it is done.
+/// Collects one channel; poses of a frame other than the last one's are dropped when it is done. Poses that are invalid
+/// before the first other one have no place, and often no anchor yet: they set none, and stay as they are.
 class StreamBuilder {
  public:
   void add(const pose_t& m, int64_t log_time_us) {
@@ -80,6 +81,7 @@ class StreamBuilder {
     poses.resize(kept);
     stream_.reasons.resize(kept);
     stream_.latencies.resize(kept);
+    if (!stream_.anchor && !stream_.local_frame) stream_.anchor = last_anchor_;  // all are invalid
     // A replay stamps each event with its message's own time: there is no latency to tell.
     if (std::all_of(stream_.latencies.begin(), stream_.latencies.end(), [](double l) { return l == 0.0; })) {
       stream_.latencies.clear();
@@ -89,6 +91,10 @@ class StreamBuilder {
 
  private:
   void to_first_anchor(const Geodetic& anchor, Odometry& pose) {
+    if (!stream_.anchor && pose.validity == Validity::kInvalid) {
+      last_anchor_ = anchor;
+      return;
+    }
     if (!stream_.anchor) stream_.anchor = last_anchor_ = anchor;
     if (same_anchor(anchor, *stream_.anchor)) return;
     if (!same_anchor(anchor, last_anchor_)) T_first_last_ = T_enu_enu(*stream_.anchor, last_anchor_ = anchor);

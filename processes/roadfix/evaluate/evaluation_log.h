@@ -26,7 +26,7 @@ struct PoseStream {
   Trajectory trajectory;             ///< ENU poses are in `anchor`'s frame
   std::vector<std::string> reasons;  ///< pose_t::reason, one per pose
   std::vector<double> latencies;     ///< s, log time minus utime
-  std::optional<Geodetic> anchor;    ///< of its first ENU pose; nothing for a local frame
+  std::optional<Geodetic> anchor;    ///< of its first ENU pose that is not invalid
   bool local_frame = false;
   bool scale_unknown = false;
   int8_t origin = 0;    ///< pose_t::ORIGIN_*

@@ -123,6 +123,33 @@ TEST_CASE("an estimate in another ENU frame lands on the reference") {
   }
 }
 
+TEST_CASE("poses that are invalid before there is an anchor give the channel none") {
+  const SmallLog small;
+  const auto read_with_start = [&](int8_t validity) {
+    const Folder folder("no_anchor_yet");
+    {
+      LogWriter writer(folder.file("out.lcm"));
+      small.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
+        if (t_s > 7.0) return;  // as long as the filter waits for a fix
+        m.anchor_lat_deg = m.anchor_lon_deg = m.anchor_height_m = 0.0;
+        m.validity = validity;
+      });
+      writer.commit();
+    }
+    return read_evaluation_log(folder.file("out.lcm"), {"POSE_INS"}).poses.at("POSE_INS");
+  };
+  const PoseStream stream = read_with_start(pose_t::VALIDITY_INVALID);
+  CHECK(stream.anchor->latitude == Approx(small.anchor.latitude).epsilon(1e-12));
+  const Odometry& last = stream.trajectory.poses.back();
+  CHECK(last.T_frame_vehicle.p.norm() < 1000.0);
+  CHECK(local(last.T_frame_vehicle, test::eight(small.end_s).T_frame_vehicle).norm() < 1e-6);
+  CHECK(stream.trajectory.poses.size() == 5001);
+  // A pose that is one belongs where it says, and all others with it.
+  const PoseStream elsewhere = read_with_start(pose_t::VALIDITY_VALID);
+  CHECK(elsewhere.anchor->latitude == 0.0);
+  CHECK(elsewhere.trajectory.poses.back().T_frame_vehicle.p.norm() > 1e6);
+}
+
 TEST_CASE("lever arms come from the calibration, and a missing one is said") {
   const Folder folder("levers");
   {
