@@ -69,6 +69,7 @@ struct AidingConfig {
   bool use_error_correlation = true;  ///< of successive GNSS positions
   bool use_return_error = true;       ///< a receiver may come back from an outage displaced
   bool use_lasting_error = true;      ///< part of a GNSS position's error is that of the one before
+  bool use_scale_steps = true;        ///< the wheels' scale may change of a sudden
   bool use_second_order = true;       ///< of the vehicle's velocity, while its heading is unsure
 };
 
@@ -162,6 +163,7 @@ void visit(AidingConfig& c, Visitor& v) {
   v.boolean("use_error_correlation", c.use_error_correlation);
   v.boolean("use_return_error", c.use_return_error);
   v.boolean("use_lasting_error", c.use_lasting_error);
+  v.boolean("use_scale_steps", c.use_scale_steps);
   v.boolean("use_second_order", c.use_second_order);
 }
 

@@ -141,6 +141,7 @@ void GnssIns::align_again() {
   agreed_since_us_ = 0;
   jump_ = JumpJudge();
   wheel_doubt_ = WheelDoubt();
+  refused_wheels_ = RefusedWheels();
   imu_doubt_ = ImuDoubt();
   lasting_watch_.begin_anew();
   forward_stale_ = true;

@@ -88,6 +88,7 @@ class GnssIns {
   bool standing_now(const InsCore& core) const;
   bool due(int64_t& next_us, int64_t t_us, double interval) const;
   void use(const Pending& p);
+  void use_wheels(const Pending& p, AidingRecord& r);
   void use_position(const Pending& measured);
   void ask_wheels(const Pending& velocity, const AidingRecord& r);
   [[nodiscard]] Eigen::Vector3d contradiction(int64_t t_us, const Eigen::Vector3d& place,
@@ -159,6 +160,7 @@ class GnssIns {
   int refused_ = 0;
   JumpJudge jump_;
   WheelDoubt wheel_doubt_;
+  RefusedWheels refused_wheels_;
   int64_t agreed_since_us_ = 0;  // first position taken since the last start or recovery
   int64_t recovered_at_us_ = 0;
   int64_t height_refused_since_us_ = 0;  // 0: the last position agreed in height as well

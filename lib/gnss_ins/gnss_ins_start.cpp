@@ -191,6 +191,7 @@ void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& nois
   if (abandoned_ && usable()) count_new_alignment();
   if (!block_done || !bank_.confirmed()) return;
   core_.emplace(bank_.leader());
+  if (config_.aiding.use_scale_steps && config_.vehicle.wheel_scale_std > 0.0) core_->follow_scale_steps();
   core_->consider({});
   bank_.stop();
   phase_ = AlignmentPhase::kDone;

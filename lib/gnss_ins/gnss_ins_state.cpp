@@ -46,6 +46,7 @@ void GnssIns::serialise(Archive& a) {
   velocity_noise_.serialise(a);
   jump_.serialise(a);
   wheel_doubt_.serialise(a);
+  refused_wheels_.serialise(a);
   imu_doubt_.serialise(a);
   monitor_.serialise(a);
   screen_.serialise(a);

@@ -18,6 +18,7 @@ void InsCore::initialise(const NavState& x, const ErrorMatrix& P) {
   x_ = x;
   P_ = P;
   fix_error_ = FixError();
+  if (scale_steps_.follows()) scale_steps_.begin();
   sums_ = TransitionSums();
   last_ = InertialStep();
   motion_ = BodyMotion();
@@ -63,11 +64,24 @@ double InsCore::longest_age() const {
   return longest;
 }
 
+void InsCore::mend_scale(double sigmas) {
+  if (!scale_steps_.most_likely(sigmas)) {
+    scale_steps_.advance(x_.t_us);
+    return;
+  }
+  flush();
+  const ScaleSteps::Since step = *scale_steps_.most_likely(sigmas);
+  x_ = retract(x_, step.size() * step.per_unit);
+  P_ += (1.0 / step.information) * (step.per_unit * step.per_unit.transpose()).eval();
+  scale_steps_.begin();
+}
+
 void InsCore::flush() {
   if (sums_.duration <= 0.0) return;
   const Transition phi(sums_, earth_.rate(), config_);
   propagate_covariance(P_, phi, sums_, P_);
   if (fix_error_.active()) fix_error_.move(phi, sums_.duration);
+  scale_steps_.move(phi);
   sums_ = TransitionSums();
 }
 

@@ -45,13 +45,14 @@ class InsCore {
   AidingRecord fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
     ErrorMatrix moved;
     std::optional<FixError> error;
+    std::optional<Transition> phi;
     const bool moves = sums_.duration > 0.0;
     if (moves) {
-      const Transition phi(sums_, earth_.rate(), config_);
-      propagate_covariance(P_, phi, sums_, moved);
+      phi.emplace(sums_, earth_.rate(), config_);
+      propagate_covariance(P_, *phi, sums_, moved);
       if (fix_error_.active()) {
         error = fix_error_;
-        error->move(phi, sums_.duration);
+        error->move(*phi, sums_.duration);
       }
     }
     Innovation<Rows> innovation(moves ? moved : P_, error ? *error : fix_error_, m);
@@ -63,12 +64,28 @@ class InsCore {
     if (moves) {
       P_ = moved;
       if (error) fix_error_ = *error;
+      scale_steps_.move(*phi);
       sums_ = TransitionSums();
     }
     if (m.alike > 1.0) innovation.weigh(m.residual, m.alike * m.R);
     innovation.apply(x_, P_, fix_error_, considered_);
+    if (scale_steps_.follows()) {
+      constexpr double kSlow = 2.0;  // m/s
+      const bool slow = x_.velocity.squaredNorm() < kSlow * kSlow;
+      innovation.follow(m,
+                        slow                                  ? ScaleSteps::By::kSlow
+                        : source == AidingSource::kWheelSpeed ? ScaleSteps::By::kWheels
+                                                              : ScaleSteps::By::kOther,
+                        scale_steps_);
+    }
     return record;
   }
+
+  /// From now on, what a step of the wheels' scale would have made of the errors is known, (M.50).
+  void follow_scale_steps() { scale_steps_.begin(); }
+  /// Takes a step of it back that explains the innovations better than chance does at this many sigmas.
+  void mend_scale(double sigmas);
+  [[nodiscard]] const ScaleSteps& scale_steps() const { return scale_steps_; }
 
   [[nodiscard]] const NavState& state() const { return x_; }
   [[nodiscard]] ErrorMatrix covariance() const;               ///< at the state's epoch
@@ -105,6 +122,7 @@ class InsCore {
     sums_.serialise(a);
     last_.serialise(a);
     fix_error_.serialise(a);
+    scale_steps_.serialise(a);
     a(P_, motion_.rate, motion_.acceleration, considered_.first, considered_.size, ahead_);
   }
 
@@ -131,6 +149,7 @@ class InsCore {
   TransitionSums sums_;
   InertialStep last_;
   FixError fix_error_;
+  ScaleSteps scale_steps_;
   BodyMotion motion_;
   StateRange considered_;
   bool ahead_ = false;

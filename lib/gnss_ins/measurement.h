@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gnss_ins/fix_error.h"
+#include "gnss_ins/scale_steps.h"
 
 namespace roadfix {
 
@@ -72,22 +73,20 @@ class Innovation {
 
   Innovation(const ErrorMatrix& P, const FixError& error, const Measurement<Rows>& m) {
     // Most of H is zero.
-    std::array<int, kStates> used{};
-    int count = 0;
     for (int k = 0; k < kStates; ++k)
-      if ((m.H.col(k).array() != 0.0).any()) used[static_cast<size_t>(count++)] = k;
+      if ((m.H.col(k).array() != 0.0).any()) used_[static_cast<size_t>(count_++)] = k;
     PHt_.setZero();
     for (int r = 0; r < Rows; ++r) {
       ErrorVector sum = ErrorVector::Zero();
-      for (int i = 0; i < count; ++i) {
-        const int k = used[static_cast<size_t>(i)];
+      for (int i = 0; i < count_; ++i) {
+        const int k = used_[static_cast<size_t>(i)];
         sum += m.H(r, k) * P.col(k);
       }
       PHt_.col(r) = sum;
     }
     explained_.setZero();
-    for (int i = 0; i < count; ++i) {
-      const int k = used[static_cast<size_t>(i)];
+    for (int i = 0; i < count_; ++i) {
+      const int k = used_[static_cast<size_t>(i)];
       explained_ += m.H.col(k).lazyProduct(PHt_.row(k));
     }
     if (error.active()) displace(error, m);
@@ -116,12 +115,7 @@ class Innovation {
   /// Kalman update in the symmetric form P -= Y Y', Y = P H' L^-T with S = L L' (M.20). `considered` states keep value
   /// and variance, but their uncertainty counts (Schmidt 1966).
   void apply(NavState& x, ErrorMatrix& P, FixError& error, const StateRange& considered) const {
-    Eigen::Matrix<double, kStates, Rows> Y;
-    for (int i = 0; i < Rows; ++i) {
-      ErrorVector column = PHt_.col(i);
-      for (int k = 0; k < i; ++k) column -= L_(i, k) * Y.col(k);
-      Y.col(i) = (1.0 / L_(i, i)) * column;
-    }
+    const Gain Y = gain();
     ErrorVector dx = Y.lazyProduct(whitened_);
     if (considered.size == 0) {
       subtract_square(P, Y);
@@ -136,6 +130,24 @@ class Innovation {
     if (error.active()) apply(error, Y);
   }
 
+  /// What the same update makes of the errors that a step of the wheels' scale has led to, (M.50).
+  void follow(const Measurement<Rows>& m, ScaleSteps::By by, ScaleSteps& steps) const {
+    const Gain Y = gain();
+    steps.use<Rows>(whitened_, by, [&](ErrorVector& errors) {
+      Residual signature = Residual::Zero();
+      for (int i = 0; i < count_; ++i) {
+        const int k = used_[static_cast<size_t>(i)];
+        signature += errors(k) * m.H.col(k);
+      }
+      for (int i = 0; i < Rows; ++i) {
+        for (int k = 0; k < i; ++k) signature(i) -= L_(i, k) * signature(k);
+        signature(i) /= L_(i, i);
+      }
+      errors -= Y.lazyProduct(signature);
+      return signature;
+    });
+  }
+
   Residual variance = Residual::Zero();
   double nis = 0.0;
   double log_likelihood = 0.0;
@@ -143,6 +155,17 @@ class Innovation {
 
  private:
   using OfError = Eigen::Matrix<double, FixError::kSize, Rows>;
+  using Gain = Eigen::Matrix<double, kStates, Rows>;
+
+  [[nodiscard]] Gain gain() const {
+    Gain Y;
+    for (int i = 0; i < Rows; ++i) {
+      ErrorVector column = PHt_.col(i);
+      for (int k = 0; k < i; ++k) column -= L_(i, k) * Y.col(k);
+      Y.col(i) = (1.0 / L_(i, i)) * column;
+    }
+    return Y;
+  }
 
   // What the fix error has in the measurement and in its correlations.
   void displace(const FixError& error, const Measurement<Rows>& m) {
@@ -188,6 +211,8 @@ class Innovation {
     return true;
   }
 
+  std::array<int, kStates> used_{};  // columns of H that are not zero
+  int count_ = 0;
   Eigen::Matrix<double, kStates, Rows> PHt_;
   OfError error_PHt_;        // of the fix error
   Small explained_;          // H P H'
