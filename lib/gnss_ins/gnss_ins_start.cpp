@@ -15,6 +15,8 @@ constexpr double kFixMaxAge = 2.5;      // s, of a fix to start from
 constexpr double kFixMaxSpacing = 3.0;  // s, between two fixes that give a velocity
 constexpr double kFixMinSpacing = 0.5;  // s
 constexpr double kStandingSpeed = 0.3;  // m/s
+constexpr int kCalmBlocks = 6;          // in a row; of 5500 blocks of moving cars two at most were (E 16)
+constexpr double kMayBeZero = 16.3;     // chi-square of a velocity that may be nought, three axes, 99.9 %
 constexpr double kParkedSlack = 3.0;    // m, by which fixes may miss the place beyond their sigma (another bay is 2.5)
 constexpr double kParkedPlace = 0.5;    // m, by which a parked car may have been rolled
 constexpr double kParkedSigma = 10.0;   // m; a place known worse is not worth keeping
@@ -26,12 +28,6 @@ struct StartVelocity {
   Eigen::Vector3d value;
   double std;
 };
-
-// Calm enough to stand: no quarter of the block differs from it by more than noise and engine shake give.
-bool calm(const ImuBlock& b, const ImuNoise& noise) {
-  const double quarter = std::sqrt(b.duration / 4.0);
-  return b.gyro_wander < 2e-3 + 3.0 * noise.gyro / quarter && b.accel_wander < 0.03 + 3.0 * noise.accel / quarter;
-}
 
 std::optional<StartVelocity> start_velocity(const EnuAnchor& enu, const GnssFix& fix,
                                             const std::optional<GnssFix>& before, const GnssInsConfig& c) {
@@ -51,12 +47,14 @@ std::optional<StartVelocity> start_velocity(const EnuAnchor& enu, const GnssFix&
 }  // namespace
 
 bool GnssIns::standing_now(const InsCore& core) const {
-  if (!config_.aiding.use_zero_velocity) return false;
-  const ImuBlock& b = monitor_.block();
+  if (!config_.aiding.use_zero_velocity || !monitor_.calm() || monitor_.frozen()) return false;
   const NavState& x = core.state();
-  if (monitor_.frozen() || !calm(b, monitor_.noise())) return false;
-  if ((b.gyro - x.gyro_bias).norm() > 4e-3) return false;
-  return x.velocity.norm() < kStandingSpeed;
+  if ((monitor_.block().gyro - x.gyro_bias).norm() > 4e-3) return false;
+  if (x.velocity.norm() < kStandingSpeed) return true;
+  // A velocity that is hardly known says little; that nothing shakes for long says much, (M.53).
+  if (monitor_.calm_blocks() < kCalmBlocks) return false;
+  const Eigen::Matrix3d cov = core.covariance().block<3, 3>(kVel, kVel);
+  return x.velocity.dot(cov.llt().solve(x.velocity)) < kMayBeZero;
 }
 
 void GnssIns::try_start(const ImuSample& imu) {
@@ -68,7 +66,7 @@ void GnssIns::try_start(const ImuSample& imu) {
   const double g = normal_gravity_enu(*enu_, Eigen::Vector3d::Zero()).norm();
   StartState s;
   s.t_us = imu.t_us;
-  s.standing = calm(b, monitor_.noise()) && v->value.norm() < kStandingSpeed &&
+  s.standing = monitor_.calm() && v->value.norm() < kStandingSpeed &&
                std::abs(b.accel.norm() - g) < 0.1 + 4.0 * config_.vehicle.accel_bias_std;
   s.mean_gyro = b.gyro;
   s.mean_accel = b.accel;
@@ -102,7 +100,7 @@ void GnssIns::try_start(const ImuSample& imu) {
 void GnssIns::try_parked(const ImuSample& imu) {
   if (!recalled_ || !recalled_->parked || seconds_between(first_step_us_, imu.t_us) < kNoFixWait) return;
   const ImuBlock& b = monitor_.block();
-  if (monitor_.frozen() || !calm(b, monitor_.noise()) || !stands_as_parked(b)) return;
+  if (monitor_.frozen() || !monitor_.calm() || !stands_as_parked(b)) return;
   anchor_ = recalled_->place;
   enu_.emplace(*anchor_);
   StartState s;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kNoiseTime = 2.0;  // s, memory of the scatter
 constexpr int kManySamples = 1000;  // count no further
+constexpr int kManyBlocks = 1000;   // likewise
 
 }  // namespace
 
@@ -77,6 +78,10 @@ void ImuMonitor::finish_block(int64_t t_us) {
   }
   sums_.setZero();
   times_.setZero();
+  const double quarter = std::sqrt(duration / kQuarters);
+  const bool calm = block_.gyro_wander < 2e-3 + 3.0 * noise_.gyro / quarter &&
+                    block_.accel_wander < 0.03 + 3.0 * noise_.accel / quarter;
+  calm_blocks_ = calm && !frozen() ? std::min(calm_blocks_ + 1, kManyBlocks) : 0;
 }
 
 void ImuMonitor::find_noise() {

@@ -54,6 +54,10 @@ class ImuMonitor {
   /// therefore tells the white noise.
   [[nodiscard]] const ImuNoise& noise() const { return noise_; }
   [[nodiscard]] const ImuBlock& block() const { return block_; }
+  /// The last block is calm enough to stand: no quarter differs from it by more than noise and engine shake give.
+  [[nodiscard]] bool calm() const { return calm_blocks_ > 0; }
+  /// So many blocks in a row were calm, (M.53).
+  [[nodiscard]] int calm_blocks() const { return calm_blocks_; }
   /// Identical readings for longer than a sensor with noise can give.
   [[nodiscard]] bool frozen() const { return repeats_ >= kFrozenSamples; }
 
@@ -80,12 +84,14 @@ class ImuMonitor {
   Eigen::Matrix<double, 6, kQuarters> sums_ = Eigen::Matrix<double, 6, kQuarters>::Zero();
   Eigen::Vector4d times_ = Eigen::Vector4d::Zero();
   ImuBlock block_;
+  int calm_blocks_ = 0;
 };
 
 template <class Archive>
 void ImuMonitor::serialise(Archive& a) {
   a(noise_.gyro, noise_.accel, last_.t_us, last_.gyro, last_.accel, repeats_, clipped_.x(), clipped_.y(), clipped_.z(),
-    sums_, times_, block_.end_us, block_.duration, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander);
+    sums_, times_, block_.end_us, block_.duration, block_.gyro, block_.accel, block_.gyro_wander, block_.accel_wander,
+    calm_blocks_);
   for (NoiseBand& band : bands_) band.serialise(a);
 }
 
