@@ -78,6 +78,8 @@ class GnssIns {
   void load(std::span<const uint8_t> bytes);
 
  private:
+  static constexpr double kOutage = 3.0;  // s without a position, after which a receiver may come back displaced
+
   void step(const ImuSample& imu);
   void step_aligned(const ImuSample& imu, bool block_done);
   void step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done);
@@ -94,7 +96,10 @@ class GnssIns {
   [[nodiscard]] Eigen::Vector3d contradiction(int64_t t_us, const Eigen::Vector3d& place,
                                               const Eigen::Vector3d& velocity);
   void doubt_imu(const Pending& p, const Eigen::Vector3d& off);
-  void show_anew(const Pending& p);
+  [[nodiscard]] bool returns(FixType type) const;
+  void show_anew();
+  void weigh(Pending& p) const;
+  [[nodiscard]] static Eigen::Vector3d return_sigmas(double level);
   void begin_return(const Pending& p);
   [[nodiscard]] LastingShare lasting_of(FixType type) const;
   AidingRecord try_position(const Pending& p, const LastingShare& lasting);
@@ -148,6 +153,7 @@ class GnssIns {
   bool unseen_ = false;                      // started where it was parked, and no position has agreed yet
   std::optional<GnssFix> fix_, fix_before_;  // good ones, for the start
   int64_t last_fix_us_ = 0;                  // the last one that passed, to know it when it comes again
+  int64_t resumed_us_ = 0;                   // the first one after the receiver was last silent for an outage
   Geodetic last_fix_;
   int64_t told_us_ = 0;  // the last fix with a velocity: its stamp, place and velocity
   Eigen::Vector3d told_place_ = Eigen::Vector3d::Zero(), told_velocity_ = Eigen::Vector3d::Zero();

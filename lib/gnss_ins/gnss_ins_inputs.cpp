@@ -30,6 +30,7 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
     anchor_ = fix.antenna;
     enu_.emplace(fix.antenna);
   }
+  if (last_fix_us_ != 0 && seconds_between(last_fix_us_, fix.t_us) > kOutage) resumed_us_ = fix.t_us;
   last_fix_us_ = fix.t_us;
   last_fix_ = fix.antenna;
   remember(fix);

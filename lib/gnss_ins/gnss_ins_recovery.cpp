@@ -16,7 +16,6 @@ constexpr double kConfirmed = 1.0;       // s since another source last agreed w
 const Eigen::Vector3d kTurnedAway(1e-4, 1e-4, 3e-3);
 constexpr double kUnnoticed = 3.0;  // s, that a bias acts until fixes of centimetres are refused for it
 constexpr double kGravity = 9.8;    // m/s2
-constexpr double kOutage = 3.0;     // s without a position, after which a receiver may come back displaced
 // Correlation time of the errors of fixes without a fixed carrier phase, until they have shown theirs: multipath and
 // code smoothing last seconds to a minute (Misra and Enge, Global Positioning System, 2006, ch. 5).
 constexpr double kCodeAlike = 5.0;  // s
@@ -33,7 +32,7 @@ void GnssIns::use(const Pending& measured) {
   if (p.kind == PendingKind::kPosition) {
     use_position(p);
   } else if (p.kind == PendingKind::kVelocity) {
-    p.cov *= velocity_noise_.variance_factor();
+    weigh(p);
     const AidingRecord r = applier_.apply(*core_, p, gates_);
     velocity_noise_.learn(r);
     note(r, p.id);
@@ -75,17 +74,17 @@ bool GnssIns::agrees_with(AidingSource source, int64_t t_us) const {
 void GnssIns::use_position(const Pending& measured) {
   Pending p = measured;
   PositionQuality& quality = position_quality_[static_cast<size_t>(p.fix_type)];
-  const double since = position_at_us_ == 0 ? 2.0 * kOutage : seconds_between(position_at_us_, p.t_us);
-  if (since > kOutage) {
-    show_anew(p);
+  const double since = seconds_between(position_at_us_, p.t_us);
+  if (position_at_us_ == 0 || since > kOutage) {
+    show_anew();
+    if (returns(p.fix_type)) begin_return(p);
   } else if (since > 0.0) {
     fix_interval_ = since;
   }
   position_at_us_ = p.t_us;
   const bool doubted = quality.noise.doubted();
   if (doubted) weigh_by_itself(p, quality.noise);
-  p.cov *= quality.noise.variance_factor();
-  if (config_.aiding.use_error_correlation) p.alike = quality.correlation.inflation();
+  weigh(p);
 
   const LastingShare lasting = lasting_of(p.fix_type);
   const Eigen::Vector3d displaced = core_->displacement();
@@ -148,18 +147,29 @@ void GnssIns::use_position(const Pending& measured) {
   note(r, p.id);
 }
 
-/// After an outage what the receiver has shown tells little of it. A fixed carrier phase was checked against its
-/// neighbours before it was called so.
-void GnssIns::show_anew(const Pending& p) {
+/// A fixed carrier phase was checked against its neighbours before it was called so.
+bool GnssIns::returns(FixType type) const {
+  return position_at_us_ != 0 && config_.aiding.use_return_error && type != FixType::kRtkFixed;
+}
+
+/// After an outage what the receiver has shown tells little of it.
+void GnssIns::show_anew() {
   lasting_watch_.begin_anew();
-  const bool returned = position_at_us_ != 0 && config_.aiding.use_return_error;
   for (size_t type = 0; type < position_quality_.size(); ++type) {
     PositionQuality& quality = position_quality_[type];
     const bool alike = type != static_cast<size_t>(FixType::kRtkFixed);
     quality.correlation.assume(alike ? std::exp(-fix_interval_ / kCodeAlike) : 0.0);
-    if (returned) quality.noise.begin_anew();
+    if (position_at_us_ != 0 && config_.aiding.use_return_error) quality.noise.begin_anew();
   }
-  if (returned && p.fix_type != FixType::kRtkFixed) begin_return(p);
+}
+
+/// As its kind has shown itself.
+void GnssIns::weigh(Pending& p) const {
+  if (p.kind == PendingKind::kVelocity) p.cov *= velocity_noise_.variance_factor();
+  if (p.kind != PendingKind::kPosition) return;
+  const PositionQuality& quality = position_quality_[static_cast<size_t>(p.fix_type)];
+  p.cov *= quality.noise.variance_factor();
+  if (config_.aiding.use_error_correlation) p.alike = quality.correlation.inflation();
 }
 
 /// The first fix tells how large the error may be: what the filter's own uncertainty does not explain of it.
@@ -168,8 +178,12 @@ void GnssIns::begin_return(const Pending& p) {
   const AidingRecord r = applier_.apply(*core_, p, no_use_);
   double excess = 0.0;
   for (size_t i = 0; i < 2; ++i) excess += 0.5 * (r.innovation[i] * r.innovation[i] - r.innovation_variance[i]);
-  const double sigma = std::clamp(std::sqrt(std::max(excess, 0.0)), kReturnLeast, kReturnMost);
-  core_->begin_return(Eigen::Vector3d(sigma, sigma, 2.0 * sigma));
+  core_->begin_return(return_sigmas(std::sqrt(std::max(excess, 0.0))));
+}
+
+Eigen::Vector3d GnssIns::return_sigmas(double level) {
+  const double sigma = std::clamp(level, kReturnLeast, kReturnMost);
+  return {sigma, sigma, 2.0 * sigma};
 }
 
 /// The fix teaches the noise before it is used, (M.37). What the gate refuses teaches nothing.

@@ -81,6 +81,11 @@ void GnssIns::try_start(const ImuSample& imu) {
       s.velocity.norm() * std::hypot(config_.vehicle.position_latency_std, config_.vehicle.time_offset_std);
   s.fix_type = fix_->fix_type;
   s.fix_cov = fix_->cov_enu;
+  if (position_at_us_ != 0 && resumed_us_ > position_at_us_) {
+    show_anew();
+    if (returns(s.fix_type)) s.returning = return_sigmas(0.0);
+  }
+  s.fix_cov *= position_quality_[static_cast<size_t>(s.fix_type)].noise.variance_factor();
   s.lasting = lasting_of(s.fix_type);
   s.antenna_cov = s.fix_cov + (moved * moved + 1e-4) * Eigen::Matrix3d::Identity();
   if (fix_->heading) {
@@ -170,7 +175,9 @@ void GnssIns::count_new_alignment() {
 void GnssIns::step_heading(const ImuSample& imu, double dt, const ImuNoise& noise, bool block_done) {
   bank_.predict(imu, dt, noise);
   const auto leader = [&]() -> const NavState& { return bank_.leader().state(); };
-  pending_.take_due(leader, [&](const Pending& p) {
+  pending_.take_due(leader, [&](const Pending& measured) {
+    Pending p = measured;
+    if (position_at_us_ != 0) weigh(p);  // as this drive has shown
     const LastingShare lasting = p.kind == PendingKind::kPosition ? lasting_of(p.fix_type) : LastingShare();
     const auto apply = [&](InsCore& core) {
       if (lasting.share > 0.0) core.expect_lasting(p.fix_type, lasting, p.cov.diagonal());

@@ -98,6 +98,10 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   (void)core.fuse(AidingSource::kZeroVelocity, s.t_us, levelling(x, s.mean_accel, gravity, s.accel_std), kNoGate);
   const BodyMotion still;
   Measurement<3> place = gnss_position(core.state(), still, s.antenna, s.antenna_cov, 0.0);
+  if (!s.returning.isZero()) {
+    core.begin_return(s.returning);
+    place.displaced = 0;
+  }
   if (s.lasting.share > 0.0) {
     core.expect_lasting(s.fix_type, s.lasting, s.fix_cov.diagonal());
     place.displaced = 0;

@@ -20,10 +20,11 @@ struct StartState {
   double accel_std = 1.0;                             ///< m/s2, how far the mean may be from gravity
   Eigen::Vector3d antenna = Eigen::Vector3d::Zero();  ///< m, enu
   Eigen::Matrix3d antenna_cov = Eigen::Matrix3d::Identity();
-  FixType fix_type = FixType::kNone;                   ///< of the fix in it,
-  LastingShare lasting;                                ///< what of that fix lasts,
-  Eigen::Matrix3d fix_cov = Eigen::Matrix3d::Zero();   ///< and its covariance, m2
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, enu
+  FixType fix_type = FixType::kNone;                    ///< of the fix in it,
+  Eigen::Vector3d returning = Eigen::Vector3d::Zero();  ///< m, by which the fix may be displaced, enu: (M.37)
+  LastingShare lasting;                                 ///< what of that fix lasts,
+  Eigen::Matrix3d fix_cov = Eigen::Matrix3d::Zero();    ///< and its covariance, m2
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   ///< m/s, enu
   double velocity_std = 1.0;
   std::optional<double> yaw;  ///< rad, vehicle, where a sensor gives it
   double yaw_std = 0.0;
