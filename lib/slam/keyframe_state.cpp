@@ -124,8 +124,7 @@ void KeyframeTracker::take_speeds() {
 std::optional<KeyframeTracker::KnownTravel> KeyframeTracker::travelled(int64_t begin_us, int64_t end_us) const {
   std::optional<KnownTravel> best;
   double best_sigma = 0.0;
-  const auto consider = [&](const TravelHistory& history, SpeedSource source) {
-    const auto way = history.between(begin_us, end_us);
+  const auto consider = [&](const std::optional<Travel>& way, SpeedSource source) {
     if (!way) return;
     const double sigma = std::hypot(way->sigma, way->scale_std * way->distance);
     if (best && sigma >= best_sigma) return;
@@ -133,8 +132,11 @@ std::optional<KeyframeTracker::KnownTravel> KeyframeTracker::travelled(int64_t b
     best_sigma = sigma;
   };
   const ScaleChoice scale = config_.scale;
-  if (scale == ScaleChoice::kAuto || scale == ScaleChoice::kWheels) consider(wheels_, SpeedSource::kWheels);
-  if (scale == ScaleChoice::kAuto || scale == ScaleChoice::kIns) consider(ins_, SpeedSource::kIns);
+  const bool wheels = scale == ScaleChoice::kAuto || scale == ScaleChoice::kWheels;
+  const bool ins = scale == ScaleChoice::kAuto || scale == ScaleChoice::kIns;
+  if (wheels) consider(wheels_.between(begin_us, end_us), SpeedSource::kWheels);
+  if (ins) consider(ins_.between(begin_us, end_us), SpeedSource::kIns);
+  if (wheels && ins) consider(in_scale_of(ins_, wheels_, begin_us, end_us), SpeedSource::kIns);
   return best;
 }
 

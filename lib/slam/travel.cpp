@@ -17,6 +17,8 @@ constexpr double kNoiseCorrelation_s = 0.1;
 constexpr double kMayTurnBack = 0.3;
 /// Of the tightest circle, 1/m: by what a way back differs from the way there.
 constexpr double kTightest = 1.0 / 7.5;
+/// Over which two sources are compared: a filter's velocity error lasts for seconds, a tyre's scale for a drive.
+constexpr int64_t kCompared_us = 10'000'000;
 /// Sigmas below which a speed may be noise.
 constexpr double kNoise = 3.0;
 
@@ -93,6 +95,29 @@ std::optional<Travel> TravelHistory::between(int64_t begin_us, int64_t end_us) c
   const double a = doubt_at(begin_us), b = doubt_at(end_us);
   const double c = turned_back(begin_us, end_us);
   travel.sigma = std::sqrt(noise2 + a * a + b * b + c * c);
+  return travel;
+}
+
+std::optional<TravelHistory::Span> TravelHistory::span() const {
+  if (marks_.empty()) return std::nullopt;
+  return Span{marks_.front().sample.t_us, marks_.back().sample.t_us};
+}
+
+std::optional<Travel> in_scale_of(const TravelHistory& late, const TravelHistory& early, int64_t begin_us,
+                                  int64_t end_us) {
+  const auto known = late.span(), own = early.span();
+  auto travel = early.between(begin_us, end_us);
+  if (!known || !own || !travel) return std::nullopt;
+  const int64_t to_us = known->last_us;
+  const int64_t from_us = std::max({to_us - kCompared_us, known->first_us, own->first_us});
+  const auto right = late.between(from_us, to_us), told = early.between(from_us, to_us);
+  if (!right || !told || !(right->distance > 0.0) || !(told->distance > 0.0)) return std::nullopt;
+  const double scale_std = std::hypot(right->scale_std, right->sigma / right->distance, told->sigma / told->distance);
+  if (!(scale_std < travel->scale_std)) return std::nullopt;
+  const double scale = right->distance / told->distance;
+  travel->distance *= scale;
+  travel->sigma *= scale;
+  travel->scale_std = scale_std;
   return travel;
 }
 

@@ -44,6 +44,11 @@ class TravelHistory {
   /// From `begin_us` to `end_us`; nothing where no sample lies within `kReach_us` of both.
   [[nodiscard]] std::optional<Travel> between(int64_t begin_us, int64_t end_us) const;
 
+  struct Span {
+    int64_t first_us = 0, last_us = 0;  ///< of the oldest sample kept and the newest
+  };
+  [[nodiscard]] std::optional<Span> span() const;
+
   void save(StateWriter& writer) const;
   void load(StateReader& reader);
 
@@ -67,5 +72,10 @@ class TravelHistory {
 
   std::deque<Mark> marks_;
 };
+
+/// The way by `early` in the scale of `late`, as the two have compared of late, (M.8e). Nothing where that is known no
+/// better than early's own scale.
+std::optional<Travel> in_scale_of(const TravelHistory& late, const TravelHistory& early, int64_t begin_us,
+                                  int64_t end_us);
 
 }  // namespace roadfix
