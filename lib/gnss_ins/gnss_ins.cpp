@@ -140,7 +140,6 @@ void GnssIns::align_again() {
   unseen_ = false;
   agreed_since_us_ = 0;
   jump_ = JumpJudge();
-  wheel_doubt_ = WheelDoubt();
   refused_wheels_ = RefusedWheels();
   imu_doubt_ = ImuDoubt();
   lasting_watch_.begin_anew();

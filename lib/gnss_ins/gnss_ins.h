@@ -18,7 +18,7 @@
 #include "gnss_ins/imu_doubt.h"
 #include "gnss_ins/imu_ring.h"
 #include "gnss_ins/jump_judge.h"
-#include "gnss_ins/wheel_doubt.h"
+#include "gnss_ins/refused_wheels.h"
 
 namespace roadfix {
 
@@ -92,9 +92,8 @@ class GnssIns {
   void use(const Pending& p);
   void use_wheels(const Pending& p, AidingRecord& r);
   void use_position(const Pending& measured);
-  void ask_wheels(const Pending& velocity, const AidingRecord& r);
-  [[nodiscard]] Eigen::Vector3d contradiction(int64_t t_us, const Eigen::Vector3d& place,
-                                              const Eigen::Vector3d& velocity);
+  void tell_imu_doubt(const Pending& velocity, const AidingRecord& r);
+  void add_up(int64_t t_us, const Eigen::Vector3d& place, const Eigen::Vector3d& velocity);
   void doubt_imu(const Pending& p, const Eigen::Vector3d& off);
   [[nodiscard]] bool returns(FixType type) const;
   void show_anew();
@@ -165,7 +164,6 @@ class GnssIns {
   int64_t refused_since_us_ = 0;
   int refused_ = 0;
   JumpJudge jump_;
-  WheelDoubt wheel_doubt_;
   RefusedWheels refused_wheels_;
   int64_t agreed_since_us_ = 0;  // first position taken since the last start or recovery
   int64_t recovered_at_us_ = 0;

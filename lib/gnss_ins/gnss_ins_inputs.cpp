@@ -47,9 +47,8 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
   p.value = enu_->enu(fix.antenna);
   p.cov = floored(fix.cov_enu, a.position_floor);
   const bool tells = fix.velocity && a.use_gnss_velocity;
-  Eigen::Vector3d since_last = Eigen::Vector3d::Zero();
   if (tells) {
-    since_last = contradiction(fix.t_us, p.value, to_enu * fix.velocity->enu);
+    add_up(fix.t_us, p.value, to_enu * fix.velocity->enu);
     p.contradiction = contradiction_;
     p.told_since_us = told_since_us_;
   }
@@ -57,7 +56,6 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
   if (tells) {
     p.kind = PendingKind::kVelocity;
     p.value = told_velocity_;
-    p.contradiction = since_last;
     const bool given = fix.velocity->cov_enu.diagonal().minCoeff() > 0.0;
     p.cov = floored(fix.velocity->cov_enu, given ? a.velocity_floor : a.velocity_default);
     pending_.push(p);
@@ -73,10 +71,10 @@ void GnssIns::add(const GnssFix& fix, int64_t id) {
   }
 }
 
-/// m, by which the receiver has gone further since its last fix than its velocities; adds it up while these come.
-Eigen::Vector3d GnssIns::contradiction(int64_t t_us, const Eigen::Vector3d& place, const Eigen::Vector3d& velocity) {
+/// What the receiver has gone further since its last fix than its velocities say, while these come.
+void GnssIns::add_up(int64_t t_us, const Eigen::Vector3d& place, const Eigen::Vector3d& velocity) {
   const double dt = seconds_between(told_us_, t_us);
-  Eigen::Vector3d since_last = place - told_place_ - 0.5 * dt * (told_velocity_ + velocity);
+  const Eigen::Vector3d since_last = place - told_place_ - 0.5 * dt * (told_velocity_ + velocity);
   if (told_us_ == 0 || dt > kTellsOn) {
     told_since_us_ = t_us;
     contradiction_.setZero();
@@ -86,7 +84,6 @@ Eigen::Vector3d GnssIns::contradiction(int64_t t_us, const Eigen::Vector3d& plac
   told_us_ = t_us;
   told_place_ = place;
   told_velocity_ = velocity;
-  return since_last;
 }
 
 void GnssIns::remember(const GnssFix& fix) {

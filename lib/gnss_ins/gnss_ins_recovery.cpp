@@ -36,7 +36,7 @@ void GnssIns::use(const Pending& measured) {
     const AidingRecord r = applier_.apply(*core_, p, gates_);
     velocity_noise_.learn(r);
     note(r, p.id);
-    if (p.fix_type == FixType::kRtkFixed) ask_wheels(p, r);
+    if (p.fix_type == FixType::kRtkFixed) tell_imu_doubt(p, r);
   } else if (p.kind == PendingKind::kMag && core_->heading_std() < config_.aiding.mag_std) {
     // Its errors do not average out: once the heading is better than the magnetometer, it only harms.
     AidingRecord r;

@@ -45,7 +45,6 @@ void GnssIns::serialise(Archive& a) {
   lasting_watch_.serialise(a);
   velocity_noise_.serialise(a);
   jump_.serialise(a);
-  wheel_doubt_.serialise(a);
   refused_wheels_.serialise(a);
   imu_doubt_.serialise(a);
   monitor_.serialise(a);

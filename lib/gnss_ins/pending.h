@@ -22,8 +22,8 @@ struct Pending {
   WheelDirection direction = WheelDirection::kSigned;
   FixType fix_type = FixType::kNone;
   double alike = 1.0;  ///< as Measurement::alike, when it is used
-  /// m, by which the receiver's positions have gone further than its velocities: of a velocity since the last one, of a
-  /// position since `told_since_us`; zero there: the fix has no velocity.
+  /// m, by which the receiver's positions have gone further than its velocities since `told_since_us`; zero there: the
+  /// fix has no velocity.
   Eigen::Vector3d contradiction = Eigen::Vector3d::Zero();
   int64_t told_since_us = 0;
 

@@ -44,7 +44,7 @@ class GnssInsStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
-    spec_.state_layout = 12;
+    spec_.state_layout = 13;
     spec_.clocks = {{kImu, 200'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }

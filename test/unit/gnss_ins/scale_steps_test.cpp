@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "filter_run.h"
-#include "gnss_ins/wheel_doubt.h"
+#include "gnss_ins/refused_wheels.h"
 #include "random_state.h"
 
 using namespace roadfix;
