@@ -69,6 +69,8 @@ float corner_score(const cv::Mat& gray, int u, int v) {
   return static_cast<float>(kScale * (trace - root));
 }
 
+constexpr double kNearer = 0.7;  ///< of the distance at which as many as are wanted would stand on a grid
+
 }  // namespace
 
 std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> taken,
@@ -78,10 +80,11 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
   std::vector<Corner> accepted;
   if (config.max_corners <= 0 || gray.cols <= 2 * border || gray.rows <= 2 * border) return accepted;
   // A grid whose cells would hold about one corner each when all are found. Where a small picture has no room for so
-  // many at their distance, they stand closer.
+  // many at their distance, they stand closer: sky and road have none, and corners that keep a distance fill half of
+  // the room that it leaves them.
   const auto expected = static_cast<double>(taken.size()) + static_cast<double>(config.max_corners);
   const double room_px = std::sqrt(static_cast<double>(gray.total()) / expected);
-  const double distance_px = std::min(config.min_distance_px, room_px);
+  const double distance_px = std::min(config.min_distance_px, kNearer * room_px);
   Occupancy occupancy(gray, distance_px);
   for (const Eigen::Vector2f& pixel : taken) occupancy.add(pixel);
 

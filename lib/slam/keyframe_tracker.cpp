@@ -130,37 +130,6 @@ SE3 KeyframeTracker::predict(int64_t t_us) const {
   return T_map_camera_ * stretched(motion_->T_before_now, seconds_between(*t_us_, t_us) / motion_->dt_s);
 }
 
-std::optional<Eigen::Vector2d> KeyframeTracker::appears(const Eigen::Vector3d& p_camera) const {
-  if (!(p_camera.z() > kMinReprojectionDepth)) return std::nullopt;
-  return left_.distort(map_.lens().bend(p_camera.hnormalized()));
-}
-
-std::vector<Feature> KeyframeTracker::hints(const SE3& T_map_camera) const {
-  std::vector<Feature> out;
-  const SE3 T_camera_map = T_map_camera.inverse();
-  const Eigen::Quaterniond q_now_before = T_camera_map.q * T_map_camera_.q;
-  for (const auto& [track, pixel] : pixels_) {
-    const Landmark* landmark = map_.find(track);
-    std::optional<Eigen::Vector2d> expected;
-    if (landmark != nullptr && landmark->p_map) {
-      expected = appears(T_camera_map * *landmark->p_map);
-    } else if (const auto before = left_.unproject(pixel.cast<double>())) {
-      expected = appears(q_now_before * map_.lens().straighten(*before).homogeneous());  // as if it were far away
-    }
-    if (expected) out.push_back({track, expected->cast<float>()});
-  }
-  // Landmarks that were not found in the last pictures: a descriptor front end may still know them.
-  const size_t seen = out.size();
-  for (const auto& [track, landmark] : map_.landmarks()) {
-    if (!landmark.p_map || pixels_.contains(track) || landmark.sightings.back().keyframe != map_.last().id) continue;
-    const auto expected = appears(T_camera_map * *landmark.p_map);
-    if (expected && left_.sees(*expected)) out.push_back({track, expected->cast<float>()});
-  }
-  std::inplace_merge(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(seen), out.end(),
-                     [](const Feature& a, const Feature& b) { return a.track < b.track; });
-  return out;
-}
-
 void KeyframeTracker::follow(const CameraFrame& frame) {
   const SE3 T_predicted = predict(frame.t_us);
   const std::vector<Feature> features = front_end_->track(frame.left, hints(T_predicted));

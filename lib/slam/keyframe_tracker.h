@@ -218,6 +218,11 @@ class KeyframeTracker {
   [[nodiscard]] SE3 predict(int64_t t_us) const;
   /// Pixel of a point in camera axes, lens correction included.
   [[nodiscard]] std::optional<Eigen::Vector2d> appears(const Eigen::Vector3d& p_camera) const;
+  struct KnownDepth {
+    Eigen::Vector2f pixel;
+    double inverse_depth = 0.0;
+  };
+  [[nodiscard]] std::vector<KnownDepth> known_depths() const;
   [[nodiscard]] std::vector<Feature> hints(const SE3& T_map_camera) const;
   [[nodiscard]] bool can_turn(const Eigen::Quaterniond& q_expected, const Eigen::Quaterniond& q_found) const;
   [[nodiscard]] bool solve(const std::vector<Feature>& features, const SE3& T_predicted);
