@@ -181,14 +181,14 @@ namespace {
 
 /// Ten car parks, whose turns are tight, with the IMU off the rear axle; by the receiver's velocity the filter would
 /// come to doubt wheels that are in another place than it believes.
-test::LevelScore off_axle(const char* name, const std::function<void(GnssInsVehicle&)>& change) {
+test::LevelScore off_axle(const char* name, const std::function<void(GnssInsConfig&)>& change) {
   ScenarioConfig truth = scenario("car_park");
   truth.imu.position_m = {0.7, -0.4, 0.8};
   truth.faults.push_back(parse_fault("gnss.no_velocity@0+1000"));
   test::LevelScore score;
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     GnssInsConfig config = test::filter_config(truth);
-    change(config.vehicle);
+    change(config);
     GnssIns filter(config);
     score.run(filter, simulate(truth, seed), 40.0, truth.duration_s - 1.0);
   }
@@ -200,18 +200,20 @@ test::LevelScore off_axle(const char* name, const std::function<void(GnssInsVehi
 }  // namespace
 
 TEST_CASE("an IMU off the rear axle is as good as one over it, whether the calibration tells where or not") {
-  const test::LevelScore unknown = off_axle("unknown", [](GnssInsVehicle&) {});
-  const test::LevelScore told = off_axle("told", [](GnssInsVehicle& v) {
-    v.p_imu_axle = {-0.7, 0.4, -0.8};
-    v.p_imu_axle_std.setConstant(0.05);
+  const test::LevelScore unknown = off_axle("unknown", [](GnssInsConfig&) {});
+  const test::LevelScore told = off_axle("told", [](GnssInsConfig& c) {
+    c.vehicle.p_imu_axle = {-0.7, 0.4, -0.8};
+    c.vehicle.p_imu_axle_std.setConstant(0.05);
   });
   for (const test::LevelScore& score : {unknown, told}) {
     CHECK(score.share() >= 0.98);
     CHECK(score.squares < 1.5 * score.variances);
   }
-  // Teeth: a place along the car alone is looked for.
-  const test::LevelScore wrong =
-      off_axle("called beside it", [](GnssInsVehicle& v) { v.p_imu_axle_std << 1.0, 0.0, 0.0; });
+  // Teeth: a place along the car alone is looked for, and nothing takes the rest for a scale that steps.
+  const test::LevelScore wrong = off_axle("called beside it", [](GnssInsConfig& c) {
+    c.vehicle.p_imu_axle_std << 1.0, 0.0, 0.0;
+    c.aiding.use_scale_steps = false;
+  });
   CHECK(wrong.share() < 0.7);
   CHECK(wrong.squares > 4.0 * wrong.variances);
 }
