@@ -73,8 +73,8 @@ class ScaleSteps {
   bool follows_ = false;
   int64_t next_us_ = 0;
   int turn_ = 0;
-  double usual_ =
-      1.0;  // mean normalised square of the wheels' innovations: they may be noisier than they are said to be
+  /// Mean normalised square of the wheels' innovations: they may be noisier than they are said to be.
+  double usual_ = 1.0;
   std::array<Since, 2 * kOctaves> since_{};
 };
 
