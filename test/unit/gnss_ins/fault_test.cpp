@@ -23,7 +23,6 @@ Worst drive_with(const char* fault, double duration_s, uint64_t seed, const char
   for (const char* f : {fault, second})
     if (f != nullptr) s.faults.push_back(parse_fault(f));
   const SimulatedDrive drive = simulate(s, seed);
-  s.faults.clear();
   GnssInsConfig config = test::filter_config(s);
   config.aiding.use_scale_steps = scale_steps;
   GnssIns filter(config);
@@ -142,7 +141,6 @@ double honest_share(bool learns_correlation) {
     s.duration_s = 110.0;
     s.faults.push_back(parse_fault("gnss.multipath@60+30:sigma_m=4,correlation_s=6,claim=0.5"));
     const SimulatedDrive drive = simulate(s, seed);
-    s.faults.clear();
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_error_correlation = learns_correlation;
     config.aiding.use_lasting_error = learns_correlation;
@@ -184,7 +182,6 @@ Return return_from_tunnel(const char* reacquire, FixType type, double sigma_m, b
     s.faults.pop_back();  // its own return
     if (reacquire != nullptr) s.faults.push_back(parse_fault(reacquire));
     const SimulatedDrive drive = simulate(s, seed);
-    s.faults.clear();
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_return_error = expects;
     config.aiding.use_error_correlation = alike;

@@ -19,7 +19,6 @@ test::LevelScore after_hole(double hole_s, double from_s, double to_s, const std
     (void)std::snprintf(fault, sizeof fault, "imu.silence@%g+3", hole_s);
     s.faults.push_back(parse_fault(fault));
     const SimulatedDrive drive = simulate(s, seed);
-    s.faults.clear();
     GnssInsConfig config = test::filter_config(s);
     set(config);
     GnssIns filter(config);

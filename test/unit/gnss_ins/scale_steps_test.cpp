@@ -91,7 +91,6 @@ Told in_tunnel(const char* fault, bool steps) {
     s.duration_s = 151.0;
     if (fault != nullptr) s.faults.push_back(parse_fault(fault));
     const SimulatedDrive drive = simulate(s, seed);
-    s.faults.clear();
     GnssInsConfig config = test::filter_config(s);
     config.aiding.use_scale_steps = steps;
     GnssIns filter(config);
