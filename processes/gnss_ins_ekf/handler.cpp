@@ -22,6 +22,8 @@ constexpr double kMicrotesla = 1e-6;
 // s, where the calibration says nothing: fixes stamped when they came out of the receiver are 20 to 100 ms old. Nought
 // would claim that they are not, and the delay would pass for a scale or a mounting error.
 constexpr double kUnknownLatency = 0.05;
+// s, of the IMU's clock against the receiver's, likewise: drivers stamp with the arrival on another computer's clock.
+constexpr double kUnknownOffset = 0.05;
 
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
@@ -163,13 +165,17 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
   v.position_latency_std = v.velocity_latency_std = kUnknownLatency;
   if (const auto& imu = calibration.sensors.imu) {
     take_known_noise(*imu, v);
-    take_known(imu->time_offset_std, v.time_offset_std);
   }
   if (const auto& gnss = calibration.sensors.gnss) {
     take_known(gnss->position_latency_std, v.position_latency_std);
     // One receiver, one way through it, unless the calibration knows better.
     v.velocity_latency_std = gnss->velocity_latency_std.value_or(v.position_latency_std);
   }
+  // The latency's doubt is between the two clocks already, and where it is not told the IMU's defines time.
+  const bool latency_told = calibration.sensors.gnss && calibration.sensors.gnss->position_latency_std;
+  const std::optional<double> offset_told =
+      calibration.sensors.imu ? calibration.sensors.imu->time_offset_std : std::nullopt;
+  v.time_offset_std = offset_told.value_or(latency_told ? kUnknownOffset : 0.0);
   if (const auto& wheels = calibration.sensors.wheels) {
     take_known(wheels->speed_scale_std, v.wheel_scale_std);
     take_known(wheels->speed_noise, v.wheel_noise);

@@ -9,22 +9,27 @@ using namespace roadfix;
 
 namespace {
 
-/// Share of the level errors within three of their sigmas, after a minute, where fixes are 80 ms old at their stamps.
-double honest_share(const Calibration& calibration) {
+/// Share of the level errors within three of their sigmas, after a minute, where the filter believes of time what this
+/// calibration makes of it.
+double honest_share(const Calibration& calibration, const ScenarioConfig& s) {
   test::LevelScore score;
   for (uint64_t seed = 1; seed <= 4; ++seed) {
-    ScenarioConfig s = scenario("city_loop");
-    s.duration_s = 110.0;
-    s.gnss.position_latency_s = s.gnss.velocity_latency_s = 0.08;
     const SimulatedDrive drive = simulate(s, seed);
     GnssInsConfig config = test::filter_config(s);
     const GnssInsVehicle said = gnss_ins_vehicle(calibration);
     config.vehicle.position_latency_std = said.position_latency_std;
     config.vehicle.velocity_latency_std = said.velocity_latency_std;
+    config.vehicle.time_offset_std = said.time_offset_std;
     GnssIns filter(config);
     score.run(filter, drive, 60.0, s.duration_s);
   }
   return score.share();
+}
+
+ScenarioConfig short_city_loop() {
+  ScenarioConfig s = scenario("city_loop");
+  s.duration_s = 110.0;
+  return s;
 }
 
 }  // namespace
@@ -40,11 +45,38 @@ TEST_CASE("a calibration that is silent about latencies does not claim to know t
   CHECK(gnss_ins_vehicle(exact).velocity_latency_std == 0.2);
 }
 
+TEST_CASE("a calibration that is silent about the IMU's clock does not claim to know it") {
+  Calibration calibration;
+  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.0);  // the latency's doubt has it
+  calibration.sensors.gnss.emplace().position_latency_std = 0.0;
+  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.05);
+  calibration.sensors.imu.emplace();
+  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.05);
+  calibration.sensors.imu->time_offset_std = 0.0;
+  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.0);
+}
+
 TEST_CASE("fixes 80 ms old are found to be so where the calibration is silent") {
+  ScenarioConfig late = short_city_loop();
+  late.gnss.position_latency_s = late.gnss.velocity_latency_s = 0.08;
   Calibration silent, exact;
   exact.sensors.gnss.emplace().position_latency_std = 0.0;
-  const double found = honest_share(silent), denied = honest_share(exact);
+  exact.sensors.imu.emplace().time_offset_std = 0.0;
+  const double found = honest_share(silent, late), denied = honest_share(exact, late);
   std::printf("fixes 80 ms old: within three sigma %.3f, told that they are not: %.3f\n", found, denied);
+  CHECK(found > 0.99);
+  CHECK(denied < 0.9);
+}
+
+TEST_CASE("an IMU whose stamps are 80 ms ahead is found to be so where the calibration is silent of its clock") {
+  ScenarioConfig ahead = short_city_loop();
+  ahead.imu.link.clock_offset_s = 0.08;
+  Calibration silent;
+  silent.sensors.gnss.emplace().position_latency_std = 0.0;
+  Calibration exact = silent;
+  exact.sensors.imu.emplace().time_offset_std = 0.0;
+  const double found = honest_share(silent, ahead), denied = honest_share(exact, ahead);
+  std::printf("an IMU 80 ms ahead: within three sigma %.3f, told that it is not: %.3f\n", found, denied);
   CHECK(found > 0.99);
   CHECK(denied < 0.9);
 }
