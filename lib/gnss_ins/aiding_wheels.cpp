@@ -36,6 +36,9 @@ Measurement<1> wheel_speed(const NavState& x, const BodyMotion& motion, double s
   m.residual(0) = speed - gain * v.value.x();
   m.H = gain * v.H.row(0);
   m.H(0, kWheelScale) = -gain * gain * v.value.x();
+  const double gaining = m.H.segment<3>(kVel) * motion.acceleration;
+  m.H(0, kWheelLatency) = -gaining;
+  m.H(0, kImuOffset) = gaining;
   m.R(0, 0) = sigma * sigma;
   return m;
 }

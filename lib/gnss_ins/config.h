@@ -20,6 +20,7 @@ struct GnssInsVehicle {
   double time_offset_std = 0.0;                                     ///< s, IMU stamp against true time
   double position_latency_std = 0.0;                                ///< s
   double velocity_latency_std = 0.0;                                ///< s
+  double wheel_latency_std = 0.0;                                   ///< s
   double wheel_scale_std = 0.01;                                    ///< 1
   double wheel_noise = 0.05;                                        ///< m/s, each speed
   double track_width = 1.5;                                         ///< m, for four wheel speeds
@@ -37,12 +38,14 @@ struct GnssInsVehicle {
 /// Latencies and clock offset show only as differences, so one clock must define time: the better one by calibration,
 /// the stamps of GNSS positions or those of the IMU. The pose is for its utime on that clock, (M.19).
 struct TimePriors {
-  double imu_offset = 0.0, position_latency = 0.0, velocity_latency = 0.0;  ///< s, standard deviations
+  double imu_offset = 0.0, position_latency = 0.0, velocity_latency = 0.0, wheel_latency = 0.0;  ///< s, sigmas
   explicit TimePriors(const GnssInsVehicle& v) {
     const bool gnss_defines = v.position_latency_std <= v.time_offset_std;
     const double both = std::hypot(v.position_latency_std, v.time_offset_std);
     (gnss_defines ? imu_offset : position_latency) = both;
-    velocity_latency = std::hypot(v.velocity_latency_std, gnss_defines ? v.position_latency_std : v.time_offset_std);
+    const double clock = gnss_defines ? v.position_latency_std : v.time_offset_std;
+    velocity_latency = std::hypot(v.velocity_latency_std, clock);
+    wheel_latency = std::hypot(v.wheel_latency_std, clock);
   }
 };
 

@@ -83,6 +83,7 @@ Transition::Transition(const TransitionSums& s, const Eigen::Vector3d& earth_rat
   const double walk = p.time_offset_walk * p.time_offset_walk * s.duration;
   if (time.imu_offset > 0.0) noise(kImuOffset) = walk;
   if (time.position_latency > 0.0 && v.time_offset_std > 0.0) noise(kPositionLatency) = walk;
+  if (time.wheel_latency > 0.0 && v.time_offset_std > 0.0 && time.imu_offset == 0.0) noise(kWheelLatency) = walk;
 }
 
 ErrorMatrix Transition::dense() const {

@@ -119,7 +119,7 @@ void GnssIns::step(const ImuSample& imu) {
   if (phase_ == AlignmentPhase::kDone) {
     core_->predict(imu, dt, noise);
     step_aligned(imu, block_done);
-    if (block_done) lag_us_ = lag_of(core_->longest_age());
+    if (block_done) lag_us_ = lag_of(core_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == AlignmentPhase::kHeading) {
     step_heading(imu, dt, noise, block_done);
   } else {

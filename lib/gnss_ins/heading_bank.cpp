@@ -46,6 +46,7 @@ ErrorVector start_sigmas(const GnssInsConfig& c, double yaw_std) {
   std(kPositionLatency) = time.position_latency;
   std(kVelocityLatency) = time.velocity_latency;
   std(kImuOffset) = time.imu_offset;
+  std(kWheelLatency) = time.wheel_latency;
   std.segment<3>(kAxle) = v.p_imu_axle_std;
   std.segment<3>(kAntenna) = v.p_imu_antenna_std;
   return std;
@@ -88,7 +89,7 @@ void HeadingBank::add_hypothesis(const Geodetic& anchor, const StartState& s, do
   log_weights_.push_back(weight);
   InsCore& core = cores_.back();
   // Delays show through velocity and acceleration, whose direction is not known yet.
-  core.consider({kPositionLatency, 3});
+  core.consider({kPositionLatency, 4});
   ErrorVector sigmas = start_sigmas(config_, yaw_std);
   if (s.memory) recall(*s.memory, x, sigmas);
   core.initialise(x, sigmas.cwiseAbs2().asDiagonal());

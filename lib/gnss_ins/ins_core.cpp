@@ -54,10 +54,12 @@ OutputErrorMatrix InsCore::output_covariance() const {
   return propagate_output_covariance(P_, Transition(sums_, earth_.rate(), config_), sums_);
 }
 
-double InsCore::longest_age() const {
+double InsCore::longest_age(bool wheels) const {
   double longest = 0.0;
-  for (const int latency : {kPositionLatency, kVelocityLatency}) {
-    const double mean = (latency == kPositionLatency ? x_.position_latency : x_.velocity_latency) - x_.imu_offset;
+  const ErrorVector x = local(NavState(), x_);
+  for (const int latency : {kPositionLatency, kVelocityLatency, kWheelLatency}) {
+    if (latency == kWheelLatency && !wheels) continue;
+    const double mean = x(latency) - x(kImuOffset);
     const double variance = P_(latency, latency) + P_(kImuOffset, kImuOffset) - 2.0 * P_(latency, kImuOffset);
     longest = std::max(longest, mean + 3.0 * std::sqrt(std::max(variance, 0.0)));
   }

@@ -94,8 +94,9 @@ class InsCore {
   [[nodiscard]] double heading_std() const { return std::sqrt(P_(kAtt + 2, kAtt + 2)); }
   /// Of the errors, as of the last covariance step.
   [[nodiscard]] const ErrorMatrix& last_covariance() const { return P_; }
-  /// s by which GNSS values may be older than their stamps on the IMU's clock, at three sigma; zero where none are.
-  [[nodiscard]] double longest_age() const;
+  /// s by which measurements, wheel speeds among them or not, may be older than their stamps on the IMU's clock, at
+  /// three sigma; zero where none are.
+  [[nodiscard]] double longest_age(bool wheels) const;
   /// The receiver has come back from an outage: its fixes may be displaced by as much as sigma (m, enu), (M.37).
   void begin_return(const Eigen::Vector3d& sigma) {
     flush();

@@ -20,6 +20,7 @@ NavState retract(const NavState& x, const ErrorVector& dx) {
   y.position_latency += dx(kPositionLatency);
   y.velocity_latency += dx(kVelocityLatency);
   y.imu_offset += dx(kImuOffset);
+  y.wheel_latency += dx(kWheelLatency);
   y.p_imu_axle += dx.segment<3>(kAxle);
   y.p_imu_antenna += dx.segment<3>(kAntenna);
   return y;
@@ -39,6 +40,7 @@ ErrorVector local(const NavState& x, const NavState& y) {
   dx(kPositionLatency) = y.position_latency - x.position_latency;
   dx(kVelocityLatency) = y.velocity_latency - x.velocity_latency;
   dx(kImuOffset) = y.imu_offset - x.imu_offset;
+  dx(kWheelLatency) = y.wheel_latency - x.wheel_latency;
   dx.segment<3>(kAxle) = y.p_imu_axle - x.p_imu_axle;
   dx.segment<3>(kAntenna) = y.p_imu_antenna - x.p_imu_antenna;
   return dx;

@@ -23,9 +23,10 @@ inline constexpr int kMounting = 22;         ///< rad, pitch and yaw of the vehi
 inline constexpr int kPositionLatency = 24;  ///< s, age of a GNSS position at its stamp
 inline constexpr int kVelocityLatency = 25;  ///< s, age of a GNSS velocity at its stamp
 inline constexpr int kImuOffset = 26;        ///< s, IMU stamp minus true time
-inline constexpr int kAxle = 27;             ///< m, imu axes: the point without sideslip, whose speed the wheels tell
-inline constexpr int kAntenna = 30;          ///< m, imu axes: the GNSS antenna's phase centre
-inline constexpr int kStates = 33;
+inline constexpr int kWheelLatency = 27;     ///< s, age of a wheel speed at its stamp
+inline constexpr int kAxle = 28;             ///< m, imu axes: the point without sideslip, whose speed the wheels tell
+inline constexpr int kAntenna = 31;          ///< m, imu axes: the GNSS antenna's phase centre
+inline constexpr int kStates = 34;
 inline constexpr int kInertialStates = 21;  ///< those that the mechanisation couples
 
 using ErrorVector = Eigen::Matrix<double, kStates, 1>;
@@ -45,6 +46,7 @@ struct NavState {
   double position_latency = 0.0;
   double velocity_latency = 0.0;
   double imu_offset = 0.0;
+  double wheel_latency = 0.0;
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();     ///< m
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();  ///< m
 
@@ -53,7 +55,7 @@ struct NavState {
   template <class Archive>
   void serialise(Archive& a) {
     a(t_us, position, velocity, q_enu_imu.coeffs(), gyro_bias, accel_bias, gyro_scale, accel_scale, wheel_scale,
-      mounting, position_latency, velocity_latency, imu_offset, p_imu_axle, p_imu_antenna);
+      mounting, position_latency, velocity_latency, imu_offset, wheel_latency, p_imu_axle, p_imu_antenna);
   }
 };
 

@@ -31,6 +31,7 @@ struct Pending {
   [[nodiscard]] double age(const NavState& x) const {
     const double latency = kind == PendingKind::kPosition   ? x.position_latency
                            : kind == PendingKind::kVelocity ? x.velocity_latency
+                           : kind == PendingKind::kWheels   ? x.wheel_latency
                                                             : 0.0;
     return latency - x.imu_offset;
   }

@@ -24,6 +24,8 @@ constexpr double kMicrotesla = 1e-6;
 constexpr double kUnknownLatency = 0.05;
 // s, of the IMU's clock against the receiver's, likewise: drivers stamp with the arrival on another computer's clock.
 constexpr double kUnknownOffset = 0.05;
+// s, likewise of wheel speeds: a control unit filters them and sends them every 10 to 20 ms.
+constexpr double kUnknownWheelLatency = 0.03;
 
 enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
@@ -46,7 +48,7 @@ class GnssInsStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
-    spec_.state_layout = 13;
+    spec_.state_layout = 14;
     spec_.clocks = {{kImu, 200'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
@@ -179,6 +181,7 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
   if (const auto& wheels = calibration.sensors.wheels) {
     take_known(wheels->speed_scale_std, v.wheel_scale_std);
     take_known(wheels->speed_noise, v.wheel_noise);
+    v.wheel_latency_std = wheels->latency_std.value_or(kUnknownWheelLatency);
     take_known(wheels->track_width, v.track_width);
   }
   const PlaceOnVehicle antenna = calibration.antenna(), axle = calibration.rear_axle();

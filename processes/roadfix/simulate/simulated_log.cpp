@@ -202,6 +202,7 @@ Calibration calibration_of(const SimulatedDrive& drive) {
     c.sensors.wheels->rate = wheels.rate_hz;
     c.sensors.wheels->speed_scale_std = std::hypot(wheels.speed_scale_std, wheels.wheel_scale_std);
     c.sensors.wheels->speed_noise = wheels.speed_noise_mps;
+    c.sensors.wheels->latency_std = clock_error_s(wheels.link, config.duration_s);
     c.sensors.wheels->track_width = wheels.track_width_m;
     // Who has moved the imu has measured by how much.
     if (!imu.position_m.isZero(0.0)) c.sensors.wheels->lever_arm = T_body_vehicle.p;

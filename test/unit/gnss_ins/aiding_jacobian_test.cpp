@@ -73,7 +73,8 @@ TEST_CASE("magnetic heading Jacobian") {
 }
 
 TEST_CASE("wheel speed Jacobian") {
-  check_everywhere<1>([](const NavState& x, const BodyMotion& m) { return wheel_speed(x, m, 5.0, 0.05, 0.0); });
+  check_everywhere<1>(
+      [](const NavState& x, const BodyMotion& m) { return wheel_speed(x, m, 5.0, 0.05, ahead(x, x.wheel_latency)); });
 }
 
 TEST_CASE("no sideslip Jacobian") {

@@ -20,6 +20,7 @@ double honest_share(const Calibration& calibration, const ScenarioConfig& s) {
     config.vehicle.position_latency_std = said.position_latency_std;
     config.vehicle.velocity_latency_std = said.velocity_latency_std;
     config.vehicle.time_offset_std = said.time_offset_std;
+    config.vehicle.wheel_latency_std = said.wheel_latency_std;
     GnssIns filter(config);
     score.run(filter, drive, 60.0, s.duration_s);
   }
@@ -77,6 +78,21 @@ TEST_CASE("an IMU whose stamps are 80 ms ahead is found to be so where the calib
   exact.sensors.imu.emplace().time_offset_std = 0.0;
   const double found = honest_share(silent, ahead), denied = honest_share(exact, ahead);
   std::printf("an IMU 80 ms ahead: within three sigma %.3f, told that it is not: %.3f\n", found, denied);
+  CHECK(found > 0.99);
+  CHECK(denied < 0.9);
+}
+
+TEST_CASE("wheel speeds 50 ms old are found to be so where the calibration is silent of their age") {
+  ScenarioConfig late = short_city_loop();
+  late.wheels.link.clock_offset_s = 0.05;
+  Calibration silent;
+  silent.sensors.gnss.emplace().position_latency_std = 0.0;
+  silent.sensors.imu.emplace().time_offset_std = 0.0;
+  silent.sensors.wheels.emplace();
+  Calibration exact = silent;
+  exact.sensors.wheels->latency_std = 0.0;
+  const double found = honest_share(silent, late), denied = honest_share(exact, late);
+  std::printf("wheel speeds 50 ms old: within three sigma %.3f, told that they are not: %.3f\n", found, denied);
   CHECK(found > 0.99);
   CHECK(denied < 0.9);
 }

@@ -33,6 +33,7 @@ class RandomState {
     x.position_latency = number(0.1);
     x.velocity_latency = number(0.1);
     x.imu_offset = number(0.1);
+    x.wheel_latency = 0.04;
     x.p_imu_axle = {number(1.0), 0.4, -0.6};
     x.p_imu_antenna = {-0.3, 0.2, 1.4};
     return x;
