@@ -6,6 +6,8 @@
 
 #include <cerrno>
 
+#include "bus/log/log_reader.h"
+#include "bus/log/output_place.h"
 #include "bus/types/message.h"
 
 namespace roadfix {
@@ -23,21 +25,33 @@ void store(uint8_t* to, uint64_t value, int size) {
 }  // namespace
 
 LogWriter::LogWriter(const std::filesystem::path& path, Mode mode) : path_(path), written_path_(path), mode_(mode) {
-  if (mode == Mode::kWhole) written_path_ += ".part";
+  if (mode == Mode::kWhole) {
+    const OutputPlace place = output_place(path);
+    path_ = place.path;
+    written_path_ = place.written;
+    refuse_what_is_no_log();
+  }
   fd_ = ::open(written_path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (fd_ < 0) throw_log_error(written_path_, "cannot create the log");
-  if (::flock(fd_, LOCK_EX | LOCK_NB) != 0 ||
-      (::ftruncate(fd_, 0) != 0 && errno != EINVAL)) {  // EINVAL: a pipe or device
+  if (std::filesystem::is_regular_file(written_path_) &&
+      (::flock(fd_, LOCK_EX | LOCK_NB) != 0 || ::ftruncate(fd_, 0) != 0)) {
     ::close(fd_);
     throw_log_error(written_path_, "cannot take the log for writing (does another process write it?)");
   }
   buffer_.reserve(kBufferBytes);
 }
 
+/// A slip of the finger in --out must not cost a calibration or a table.
+void LogWriter::refuse_what_is_no_log() const {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path_, ignored) || std::filesystem::file_size(path_, ignored) == 0) return;
+  if (!LogReader(path_).next()) throw LogError(path_.string() + ": is there and no log; it would be replaced");
+}
+
 LogWriter::~LogWriter() {
   if (fd_ < 0) return;
   if (mode_ == Mode::kWhole) {
-    ::unlink(written_path_.c_str());
+    if (written_path_ != path_) ::unlink(written_path_.c_str());
   } else {
     try {
       flush(false);
@@ -103,7 +117,7 @@ void LogWriter::flush(bool to_disk) {
 
 void LogWriter::commit() {
   flush(true);
-  if (mode_ == Mode::kWhole && ::rename(written_path_.c_str(), path_.c_str()) != 0) {
+  if (written_path_ != path_ && ::rename(written_path_.c_str(), path_.c_str()) != 0) {
     throw_log_error(path_, "cannot give the log its name");
   }
   ::close(fd_);

@@ -12,11 +12,14 @@ namespace roadfix {
 class LogWriter {
  public:
   enum class Mode {
-    kWhole,     ///< appears under its name only at commit(); without it nothing stays but, after a kill, PATH.part
+    /// Appears under its name only at commit(); without it nothing stays but, after a kill, PATH.part. A device or pipe
+    /// gets the bytes as they come.
+    kWhole,
     kRecording  ///< grows under its own name: what was flushed survives a kill
   };
 
-  /// Throws LogError where the file cannot be created or another process is writing it.
+  /// Throws LogError where the file cannot be created, another process is writing it, or kWhole would replace a file
+  /// that is no log.
   explicit LogWriter(const std::filesystem::path& path, Mode mode = Mode::kWhole);
   ~LogWriter();
   LogWriter(const LogWriter&) = delete;
@@ -37,6 +40,7 @@ class LogWriter {
   [[nodiscard]] uint64_t hash() const { return hash_.value(); }
 
  private:
+  void refuse_what_is_no_log() const;
   void put(const void* data, std::size_t size);
   [[nodiscard]] std::size_t hand_out(std::span<const uint8_t> data) const;
 

@@ -1,11 +1,15 @@
+#include <sys/stat.h>
+
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <random>
+#include <thread>
 
 #include "bus/log/log_reader.h"
 #include "bus/log/log_writer.h"
+#include "bus/log/output_place.h"
 #include "support/temporary_folder.h"
 
 using namespace roadfix;
@@ -98,6 +102,77 @@ TEST_CASE("a log that is not committed leaves nothing under its name") {
     REQUIRE_THROWS_AS(LogWriter(folder / "a.lcm"), LogError);  // two writers of one log
   }
   REQUIRE(std::filesystem::is_empty(folder / ""));
+}
+
+TEST_CASE("a log written to a device or a pipe goes there and leaves the device in its place") {
+  test::TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/null", folder / "null");  // what goes wrong here costs the link, not the device
+  write_log(folder / "null");
+  REQUIRE(std::filesystem::is_character_file(folder / "null"));
+  LogWriter one(folder / "null");
+  LogWriter other(folder / "null");  // nobody owns it
+
+  write_log(folder / "a.lcm");
+  REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
+  std::string through;
+  std::thread reader([&] { through = read_bytes(folder / "pipe"); });
+  write_log(folder / "pipe");
+  reader.join();
+  REQUIRE(through == read_bytes(folder / "a.lcm"));
+  REQUIRE(std::filesystem::is_fifo(folder / "pipe"));
+  if (!std::filesystem::exists("/dev/full")) return;
+  std::filesystem::create_symlink("/dev/full", folder / "full");
+  LogWriter full(folder / "full");
+  full.write("IMU", 1, payload(1));
+  REQUIRE_THROWS_WITH(full.commit(), Catch::Contains("No space left"));
+}
+
+TEST_CASE("a log written to a link's name takes the place of the file behind it") {
+  test::TemporaryFolder folder;
+  write_log(folder / "a.lcm");
+  const std::string whole = read_bytes(folder / "a.lcm");
+  {
+    LogWriter writer(folder / "real.lcm");
+    writer.commit();
+  }
+  std::filesystem::create_symlink("real.lcm", folder / "link.lcm");
+  write_log(folder / "link.lcm");
+  REQUIRE(std::filesystem::is_symlink(folder / "link.lcm"));
+  REQUIRE(read_bytes(folder / "real.lcm") == whole);
+}
+
+TEST_CASE("a log takes the place of no other kind of file, and of no folder") {
+  test::TemporaryFolder folder;
+  write_bytes(folder / "calibration.yaml", "body_origin: imu\n");
+  REQUIRE_THROWS_WITH(LogWriter(folder / "calibration.yaml"), Catch::Contains("is there and no log"));
+  REQUIRE(read_bytes(folder / "calibration.yaml") == "body_origin: imu\n");
+  REQUIRE_THROWS_WITH(LogWriter(folder.path()), Catch::Contains("Is a directory"));
+  REQUIRE_FALSE(std::filesystem::exists(folder.path().string() + ".part"));
+  write_log(folder / "a.lcm");
+  {
+    LogWriter unfinished(folder / "a.lcm");
+    unfinished.write("IMU", 1, payload(1));
+    unfinished.flush(true);
+  }
+  LogReader reader(folder / "a.lcm");  // a run that fails leaves what was there
+  REQUIRE(intact_events(reader).size() == kEvents);
+  write_log(folder / "a.lcm");
+}
+
+TEST_CASE("an output may be an input under no name") {
+  test::TemporaryFolder folder;
+  write_log(folder / "a.lcm");
+  write_log(folder / "b.lcm.part");  // left by a run that was killed
+  std::filesystem::create_symlink("a.lcm", folder / "link.lcm");
+  std::filesystem::create_hard_link(folder / "a.lcm", folder / "hard.lcm");
+  const auto replaces = Catch::Contains("would replace the input");
+  for (const char* out : {"a.lcm", "link.lcm", "hard.lcm"}) {
+    CAPTURE(out);
+    REQUIRE_THROWS_WITH(refuse_to_replace(folder / "a.lcm", folder / out), replaces);
+  }
+  REQUIRE_THROWS_WITH(refuse_to_replace(folder / "b.lcm.part", folder / "b.lcm"), replaces);
+  REQUIRE_NOTHROW(refuse_to_replace(folder / "a.lcm", folder / "b.lcm"));
+  REQUIRE_NOTHROW(refuse_to_replace(folder / "a.lcm", "/dev/null"));
 }
 
 TEST_CASE("a full disk is an error and leaves nothing plausible") {
