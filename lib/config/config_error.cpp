@@ -2,9 +2,27 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 
+#include "bus/log/log_file.h"
+#include "bus/log/output_place.h"
+
 namespace roadfix {
+
+namespace {
+
+bool is_log(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  uint32_t magic = 0;
+  std::ifstream stream(path, std::ios::binary);
+  for (int i = 0; i < 4; ++i) magic = (magic << 8U) | static_cast<uint32_t>(stream.get() & 0xFF);
+  return stream.good() && magic == kLogMagic;
+}
+
+}  // namespace
 
 ConfigError::ConfigError(const std::string& file, int line, const std::string& message)
     : std::runtime_error(line > 0 ? fmt::format("{}:{}: {}", file, line, message)
@@ -30,14 +48,20 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t max_by
 void write_text_file(const std::filesystem::path& path, const std::string& text) {
   std::error_code error;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), error);
-  const std::filesystem::path partial = path.string() + ".part";
-  {
-    std::ofstream stream(partial, std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw ConfigError(path.string(), 0, "cannot be written");
+  if (error) throw ConfigError(path.string(), 0, "its folder cannot be made: " + error.message());
+  const OutputPlace place = output_place(path);
+  if (is_log(place.path)) throw ConfigError(path.string(), 0, "is a log; it would be replaced");
+  errno = 0;
+  std::ofstream stream(place.written, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) {
+    const std::string why = std::strerror(errno);
+    if (place.written != place.path) std::filesystem::remove(place.written, error);
+    throw ConfigError(path.string(), 0, "cannot be written: " + why);
   }
-  std::filesystem::rename(partial, path, error);
+  if (place.written == place.path) return;
+  std::filesystem::rename(place.written, place.path, error);
   if (error) throw ConfigError(path.string(), 0, "cannot be written: " + error.message());
 }
 

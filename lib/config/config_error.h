@@ -18,7 +18,8 @@ class ConfigError : public std::runtime_error {
 /// The whole file; ConfigError where it cannot be read or is longer than max_bytes.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{1} << 24U);
 
-/// Writes the whole file, its folders too, under its name only when it is complete; ConfigError where that fails.
+/// Writes the whole file, its folders too, under its name only when it is complete (bus/log/output_place.h);
+/// ConfigError where that fails or would replace a log.
 void write_text_file(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace roadfix

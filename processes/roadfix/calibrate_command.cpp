@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <roadfix/image_t.hpp>
@@ -15,6 +14,7 @@
 #include "bus/types/message.h"
 #include "bus/types/schema.h"
 #include "config/calibration.h"
+#include "config/config_error.h"
 #include "features/front_end.h"
 #include "geometry/frames.h"
 #include "msckf/camera_imu.h"
@@ -100,10 +100,7 @@ void calibrate(const Options& options) {
   left.time_offset = found->time_offset;
   left.time_offset_std = offset_std;
   const std::filesystem::path path = options.vehicle / "calibration.yaml";
-  std::ofstream file(path, std::ios::binary);
-  file << calibration_text(calibration);
-  file.close();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+  write_text_file(path, calibration_text(calibration));
   std::cout << path.string() << "\n";
 }
 

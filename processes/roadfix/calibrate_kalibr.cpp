@@ -1,10 +1,8 @@
 // roadfix calibrate kalibr: takes the cameras of a Kalibr chain into a vehicle's calibration.
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
-#include <stdexcept>
 
 #include "config/config_error.h"
 #include "config/kalibr.h"
@@ -27,11 +25,7 @@ void add_kalibr_command(CLI::App& calibrate) {
     Calibration calibration;
     if (std::filesystem::exists(path)) calibration = load_calibration(options->vehicle);
     take_kalibr(parse_kalibr(read_text_file(options->chain), options->chain.string()), calibration);
-    std::filesystem::create_directories(options->vehicle);
-    std::ofstream file(path, std::ios::binary);
-    file << calibration_text(calibration);
-    file.close();
-    if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+    write_text_file(path, calibration_text(calibration));
     std::cout << path.string() << "\n";
   });
 }

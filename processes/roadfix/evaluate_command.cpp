@@ -3,10 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 
+#include "config/config_error.h"
 #include "geometry/frames.h"
 #include "roadfix/commands.h"
 #include "roadfix/evaluate/evaluation_log.h"
@@ -26,14 +26,6 @@ struct Options {
   std::filesystem::path out;
   std::filesystem::path json;
 };
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw EvaluationLogError(path.string() + ": cannot be written");
-}
 
 EvaluationOptions evaluation_options(const Options& options) {
   EvaluationOptions out;
@@ -113,10 +105,10 @@ void run(const Options& options) {
   std::filesystem::path folder = options.out;
   if (folder.empty()) folder = options.log.parent_path() / (options.log.stem().string() + "-report");
   const std::string json = report_json(report).dump(2) + "\n";
-  write_text(folder / "figures.json", json);
-  if (!options.json.empty()) write_text(options.json, json);
-  for (const ChannelScore& c : report.channels) write_text(folder / (c.channel + "_errors.csv"), errors_csv(c));
-  write_text(folder / "report.html", report_page(report));
+  write_text_file(folder / "figures.json", json);
+  if (!options.json.empty()) write_text_file(options.json, json);
+  for (const ChannelScore& c : report.channels) write_text_file(folder / (c.channel + "_errors.csv"), errors_csv(c));
+  write_text_file(folder / "report.html", report_page(report));
   std::cout << report_table(report) << (folder / "report.html").string() << "\n";
 }
 

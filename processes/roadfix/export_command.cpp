@@ -1,9 +1,10 @@
 // roadfix export: a channel's poses for other tools.
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <iostream>
 #include <memory>
+#include <sstream>
 
+#include "config/config_error.h"
 #include "evaluation/trajectory_formats.h"
 #include "roadfix/commands.h"
 #include "roadfix/evaluate/evaluation_log.h"
@@ -40,10 +41,9 @@ void run(const Options& options) {
   if (stream == log.poses.end()) {
     throw EvaluationLogError(options.log.string() + ": no poses on channel " + options.channel);
   }
-  std::ofstream out(options.out, std::ios::binary);
-  write(out, stream->second, options);
-  out.close();
-  if (!out) throw EvaluationLogError(options.out.string() + ": cannot be written");
+  std::ostringstream text;
+  write(text, stream->second, options);
+  write_text_file(options.out, text.str());
   std::cout << options.out.string() << "\n";
 }
 

@@ -8,6 +8,7 @@
 
 #include "bus/log/log_survey.h"
 #include "bus/log/log_writer.h"
+#include "bus/log/output_place.h"
 #include "bus/types/message.h"
 #include "roadfix/commands.h"
 
@@ -67,9 +68,7 @@ void check_log(const LogArguments& arguments) {
 /// Copies the events that `wanted` takes; their stamps stay.
 template <class Wanted>
 void copy_log(const LogArguments& arguments, const Wanted& wanted) {
-  if (std::error_code ignored; std::filesystem::equivalent(arguments.in, arguments.out, ignored)) {
-    throw std::runtime_error(arguments.out + ": the output would replace the input");
-  }
+  refuse_to_replace(arguments.in, arguments.out);
   LogReader reader(arguments.in);
   LogWriter writer(arguments.out);
   int64_t events = 0;

@@ -148,6 +148,10 @@ TEST_CASE("a log without the stage's clock, or over itself, is an error that lea
   REQUIRE_THROWS_WITH(replay(folder / "absent.lcm", folder / "out.lcm", stages({filter_spec()})),
                       Contains("absent.lcm"));
   REQUIRE(std::distance(std::filesystem::directory_iterator(folder / ""), {}) == 1);
+  std::filesystem::rename(folder / "in.lcm", folder / "killed.lcm.part");
+  REQUIRE_THROWS_WITH(replay(folder / "killed.lcm.part", folder / "killed.lcm", stages({filter_spec()})),
+                      Contains("would replace the input"));
+  REQUIRE(events(folder / "killed.lcm.part", "IMU").size() == 100);
 }
 
 TEST_CASE("damaged bytes in the input are counted and the rest is replayed") {

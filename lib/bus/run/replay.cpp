@@ -8,6 +8,7 @@
 
 #include "bus/log/log_index.h"
 #include "bus/log/log_writer.h"
+#include "bus/log/output_place.h"
 
 namespace roadfix {
 
@@ -226,9 +227,7 @@ ReplaySummary Replayer::summary() const {
 
 ReplaySummary replay(const std::filesystem::path& in, const std::filesystem::path& out,
                      std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options) {
-  if (std::error_code ignored; std::filesystem::equivalent(in, out, ignored)) {
-    throw std::runtime_error(out.string() + ": the output would replace the input");
-  }
+  refuse_to_replace(in, out);
   return Replayer(in, out, std::move(stages), options).run();
 }
 

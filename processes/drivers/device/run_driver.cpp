@@ -5,6 +5,7 @@
 
 #include "bus/log/log_reader.h"
 #include "bus/log/log_writer.h"
+#include "bus/log/output_place.h"
 #include "bus/run/command_line.h"
 #include "bus/run/run_process.h"
 #include "bus/run/service.h"
@@ -77,6 +78,7 @@ void run(const CommandLine& arguments, const std::string& device, const DriverPr
 DriverReplay replay_driver(const std::filesystem::path& in, const std::filesystem::path& out,
                            const DriverSetup& setup) {
   const MessageCheck check = Schema::built_in().check_of("raw_t");
+  refuse_to_replace(in, out);
   LogReader reader(in);
   LogWriter writer(out);
   LogOutputs outputs(writer);

@@ -6,6 +6,7 @@
 
 #include "config/config.h"
 #include "sample_config.h"
+#include "support/temporary_folder.h"
 
 namespace roadfix {
 namespace {
@@ -89,6 +90,27 @@ void visit(Holder& c, Visitor& v) {
 TEST_CASE("a group without values is written so that it can be read") {
   CHECK(config_text(Holder{}) == "empty: {}\nempties:\n  - {}\n  - {}\n");
   CHECK(parse_config<Holder>(config_text(Holder{}), "f").empties.size() == 2);
+}
+
+TEST_CASE("a text is written whole or not at all, through links and to devices, and over no log") {
+  namespace fs = std::filesystem;
+  const test::TemporaryFolder folder;
+  write_text_file(folder / "new/a.yaml", "one");
+  fs::create_symlink("new/a.yaml", folder / "link.yaml");
+  write_text_file(folder / "link.yaml", "two");
+  CHECK(fs::is_symlink(folder / "link.yaml"));
+  CHECK(read_text_file(folder / "new/a.yaml") == "two");
+  write_text_file("/dev/null", "three");
+  CHECK(fs::is_character_file("/dev/null"));
+  if (fs::exists("/dev/full"))
+    CHECK_THROWS_WITH(write_text_file("/dev/full", "four"), Catch::Contains("No space left"));
+  const std::string log = "\xED\xA1\xDA\x01 and so on";
+  write_text_file(folder / "a.lcm", log);
+  CHECK_THROWS_WITH(write_text_file(folder / "a.lcm", "five"), Catch::Contains("is a log"));
+  CHECK(read_text_file(folder / "a.lcm") == log);
+  CHECK_THROWS_WITH(write_text_file(folder / "new/a.yaml/b.yaml", "six"), Catch::Contains("folder"));
+  CHECK_THROWS_WITH(write_text_file(folder / "new", "seven"), Catch::Contains("Is a directory"));
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path())) CHECK(entry.path().extension() != ".part");
 }
 
 }  // namespace
