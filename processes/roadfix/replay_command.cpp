@@ -31,6 +31,10 @@ void print_summary(const ReplayArguments& arguments, const ReplaySummary& summar
     std::cerr << fmt::format("roadfix: {}: damaged at byte {}: {} bytes passed over, {}\n", arguments.in, damage.offset,
                              damage.bytes, damage.what);
   }
+  for (const auto& [channel, count] : summary.passed_over) {
+    std::cerr << fmt::format("roadfix: {}: {}: {} messages passed over, whose stamps contradict the others\n",
+                             arguments.in, channel, count);
+  }
   for (const ReplaySummary::Input& input : summary.inputs) {
     const InputCounters& c = input.counters;
     if (c.lost + c.late + c.undecodable + c.refused + c.duplicate == 0) continue;

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <random>
 
+#include "bus/log/stray_stamps.h"
 #include "support/chain_stage.h"
 #include "support/small_drive.h"
 #include "support/temporary_folder.h"
@@ -171,4 +172,70 @@ TEST_CASE("damaged bytes in the input are counted and the rest is replayed") {
   REQUIRE(gnss.undecodable == 1);
   REQUIRE(gnss.lost == 1);
   REQUIRE(events(folder / "out.lcm", "POSE_INS").size() == 500);
+}
+
+TEST_CASE("one stray stamp costs its own message and none of the others") {
+  TemporaryFolder folder;
+  const std::vector<DriveMessage> drive = small_drive(10.0);
+  const auto count_of = [](const ReplaySummary& summary, const std::string& channel) {
+    for (const ReplaySummary::Input& input : summary.inputs) {
+      if (input.channel == channel) return input.counters;
+    }
+    return InputCounters{};
+  };
+  struct Stray {
+    std::string channel;
+    int64_t seq;
+    int64_t utime;
+  };
+  constexpr int64_t kYear_us = 31'557'600'000'000;
+  std::vector<Stray> strays;
+  for (const int64_t utime :
+       {int64_t{-5}, int64_t{0}, kDriveStart_us - 20 * kYear_us, kDriveStart_us + 1'000'000, kDriveStart_us + 9'000'000,
+        kDriveStart_us + 60'000'000, kDriveStart_us + 20 * kYear_us}) {
+    for (const int64_t part : {0, 3, 5}) {  // of ten of the drive
+      strays.push_back({"IMU", part * 100, utime});
+      strays.push_back({"GNSS", part * 4, utime});
+    }
+    strays.push_back({"IMU", 999, utime});
+  }
+  for (const Stray& stray : strays) {
+    CAPTURE(stray.channel, stray.seq, stray.utime);
+    std::vector<DriveMessage> hurt = drive;
+    for (DriveMessage& m : hurt) {
+      if (m.channel != stray.channel || m.header.seq != stray.seq) continue;
+      if (stray.channel == "IMU") m = drive_message("IMU", stray.utime, stray.seq, decode<imu_t>(m.bytes));
+      if (stray.channel == "GNSS") m = drive_message("GNSS", stray.utime, stray.seq, decode<gnss_t>(m.bytes));
+    }
+    write_drive(folder / "in.lcm", hurt);
+    const ReplaySummary summary = replay(folder / "in.lcm", folder / "out.lcm", stages({filter_spec()}));
+    const auto [lost, applied] = std::pair(count_of(summary, stray.channel).lost, count_of(summary, "IMU").applied);
+    CHECK(lost <= 1);
+    // The last 250 ms wait, and with them what a fix may be late.
+    CHECK(applied >= 1000 - 26 - (stray.channel == "IMU" ? 1 : 0));
+    CHECK(count_of(summary, "GNSS").applied >= 39 - (stray.channel == "GNSS" ? 1 : 0));
+    CHECK(events(folder / "out.lcm", "POSE_INS").size() >= (stray.channel == "IMU" ? 999U : 1000U));
+    if (stray.utime != kDriveStart_us + 60'000'000) CHECK(summary.data_s == Approx(10.0).margin(0.1));
+  }
+}
+
+TEST_CASE("stamps that are wrong by the many are left to the stage") {
+  std::vector<Stamp> twice;  // a drive that is in the log twice
+  for (int64_t i = 0; i < 100; ++i) twice.push_back({1, i % 50, i});
+  const auto none = [](const std::vector<StampError>& errors) {
+    return std::count(errors.begin(), errors.end(), StampError::kNone) == static_cast<int64_t>(errors.size());
+  };
+  CHECK(none(stray_stamps(twice)));
+  CHECK_FALSE(none(stamp_errors(twice)));
+  std::vector<Stamp> right;
+  for (int64_t i = 0; i < 100; ++i) right.push_back({i / 50, i % 50, 1000 * i});
+  std::swap(right[10], right[90]);  // their order says nothing
+  CHECK(none(stamp_errors(right)));
+  right[40].utime -= 20'000;
+  right[45].utime += 3'000;
+  const std::vector<StampError> errors = stray_stamps(right);
+  CHECK(errors[40] == StampError::kEarly);
+  CHECK(errors[45] == StampError::kLate);
+  CHECK(std::count(errors.begin(), errors.end(), StampError::kNone) == 98);
+  CHECK(none(stray_stamps(std::vector<Stamp>{{1, 0, 10}, {1, 1, 5}})));
 }

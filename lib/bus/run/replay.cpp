@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <stdexcept>
 
 #include "bus/log/log_index.h"
 #include "bus/log/log_writer.h"
 #include "bus/log/output_place.h"
+#include "bus/log/stray_stamps.h"
 
 namespace roadfix {
 
@@ -49,6 +49,7 @@ class Replayer : public MessageSink {
   void route(std::size_t stage);
   void require_clock(const StageRunner& runner) const;
   [[nodiscard]] bool is_copied(const std::string& channel) const;
+  void pass_over_stray_stamps();
   void begin_at_snapshot(std::size_t stage);
   void dispatch(std::size_t begin, std::size_t end);
   void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) override;
@@ -63,6 +64,8 @@ class Replayer : public MessageSink {
   std::map<std::string, std::vector<Route>> routes_;
   std::map<std::string, std::size_t> producers_;
   LogIndex index_;
+  std::vector<bool> passed_over_;  // of the index's messages
+  Header first_, last_;            // of those that are not
   std::vector<std::vector<Delivery>> inboxes_;
   std::vector<Write> writes_;
   int64_t utime_ = 0;
@@ -83,6 +86,7 @@ Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path&
     return is_read || is_copied(name) || (options_.from_s && name.starts_with("STATE_"));
   });
   for (const auto& runner : runners_) require_clock(*runner);
+  pass_over_stray_stamps();
   if (!options_.from_s) return;
   for (std::size_t stage = 0; stage < runners_.size(); ++stage) begin_at_snapshot(stage);
 }
@@ -92,10 +96,34 @@ bool Replayer::is_copied(const std::string& channel) const {
   return std::find(copied.begin(), copied.end(), channel) != copied.end();
 }
 
+void Replayer::pass_over_stray_stamps() {
+  std::vector<std::vector<Stamp>> stamps(index_.channels.size());
+  for (const IndexedMessage& m : index_.messages) {
+    stamps[static_cast<std::size_t>(m.channel)].push_back({m.header.run, m.header.seq, m.header.utime});
+  }
+  std::vector<std::vector<StampError>> errors;
+  for (const std::vector<Stamp>& channel : stamps) errors.push_back(stray_stamps(channel));
+  std::vector<std::size_t> next(index_.channels.size());
+  bool any = false;
+  for (const IndexedMessage& m : index_.messages) {
+    const auto channel = static_cast<std::size_t>(m.channel);
+    const StampError error = errors[channel][next[channel]++];
+    const bool stray = error == StampError::kEarly || error == StampError::kFar;
+    passed_over_.push_back(stray);
+    if (stray) {
+      ++summary_.passed_over[index_.channels[channel]];
+    } else {
+      if (!any) first_ = m.header;
+      last_ = m.header;
+      any = true;
+    }
+  }
+}
+
 void Replayer::begin_at_snapshot(std::size_t stage) {
   StageRunner& runner = *runners_[stage];
   const int channel = index_.channel(stage_channel("STATE_", runner.spec().name));
-  const int64_t until = index_.messages.front().header.utime + std::llround(*options_.from_s * 1e6);
+  const int64_t until = first_.utime + std::llround(*options_.from_s * 1e6);
   const MessageCheck check = Schema::built_in().check_of("state_t");
   const IndexedMessage* last = nullptr;
   for (const IndexedMessage& message : index_.messages) {
@@ -164,7 +192,7 @@ void Replayer::dispatch(std::size_t begin, std::size_t end) {
       writes_.push_back({channel, message.header.seq, {data.begin(), data.end()}});
     }
     const auto found = routes_.find(channel);
-    if (found == routes_.end()) continue;
+    if (found == routes_.end() || passed_over_[i]) continue;
     const auto producer = producers_.find(channel);
     if (producer != producers_.end() && utime_ > beginnings_[producer->second].outputs_after) continue;
     for (const Route& route : found->second) {
@@ -206,10 +234,7 @@ void Replayer::write_group() {
 
 ReplaySummary Replayer::summary() const {
   ReplaySummary summary = summary_;
-  if (!index_.messages.empty()) {
-    const int64_t span_us = index_.messages.back().header.utime - index_.messages.front().header.utime;
-    summary.data_s = static_cast<double>(span_us) * 1e-6;
-  }
+  summary.data_s = (static_cast<double>(last_.utime) - static_cast<double>(first_.utime)) * 1e-6;
   summary.damage = reader_.damage();
   for (const auto& runner : runners_) {
     const StageSpec& spec = runner->spec();

@@ -1,9 +1,11 @@
 /// Runs stages over a log, deterministically: messages in the order (utime, channel, run, seq), whatever their order in
-/// the file; the outputs of a stage are inputs of the others; every output event is stamped with its message's utime
-/// and written in the order (utime, channel, seq).
+/// the file; what bears a stray stamp (log/stray_stamps.h) and would be taken before its time, or ages from the rest,
+/// is passed over, so that it costs itself and nothing behind it; the outputs of a stage are inputs of the others;
+/// every output event is stamped with its message's utime and written in the order (utime, channel, seq).
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -23,9 +25,10 @@ struct ReplayOptions {
 };
 
 struct ReplaySummary {
-  int64_t messages = 0;  ///< dispatched to stages
-  int64_t outputs = 0;   ///< written, copies included
-  double data_s = 0.0;   ///< from the first message to the last
+  int64_t messages = 0;                        ///< dispatched to stages
+  int64_t outputs = 0;                         ///< written, copies included
+  double data_s = 0.0;                         ///< from the first message to the last
+  std::map<std::string, int64_t> passed_over;  ///< per channel: messages with a stray stamp
   std::vector<LogDamage> damage;
   std::vector<HandlerTiming::Row> timing;
   struct Input {
