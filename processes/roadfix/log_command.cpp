@@ -53,10 +53,10 @@ void check_log(const LogArguments& arguments) {
   print_damage(arguments, survey.damage);
   bool whole = survey.damage.empty();
   for (const auto& [name, channel] : survey.channels) {
-    if (channel.undecodable + channel.missing + channel.repeated == 0) continue;
-    whole = whole && channel.undecodable + channel.missing == 0;
-    std::cout << fmt::format("{}: {} undecodable, {} missing by seq, {} repeated\n", name, channel.undecodable,
-                             channel.missing, channel.repeated);
+    if (channel.undecodable + channel.missing + channel.misstamped + channel.repeated == 0) continue;
+    whole = whole && channel.undecodable + channel.missing + channel.misstamped == 0;
+    std::cout << fmt::format("{}: {} undecodable, {} missing by seq, {} stamped against their seq, {} repeated\n", name,
+                             channel.undecodable, channel.missing, channel.misstamped, channel.repeated);
   }
   if (survey.backward_stamps > 0) {
     std::cout << fmt::format("{} events are stamped earlier than the one before; harmless\n", survey.backward_stamps);
@@ -125,9 +125,8 @@ void add_log_command(CLI::App& app) {
     return command;
   };
   add("info", "Channels, types, rates", false)->callback([arguments] { print_info(*arguments); });
-  add("check", "Damage, broken messages, gaps; exit status 1 where there is any", false)->callback([arguments] {
-    check_log(*arguments);
-  });
+  add("check", "Damage, broken messages, gaps, stamps that contradict seq; exit status 1 where there is any", false)
+      ->callback([arguments] { check_log(*arguments); });
   add("repair", "Copy all intact events", true)->callback([arguments] {
     copy_log(*arguments, [](const LogEvent&) { return true; });
   });

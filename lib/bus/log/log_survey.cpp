@@ -1,16 +1,15 @@
 #include "bus/log/log_survey.h"
 
 #include <algorithm>
+#include <tuple>
 
+#include "bus/log/stray_stamps.h"
 #include "bus/types/message.h"
 #include "bus/types/schema.h"
 
 namespace roadfix {
 
 namespace {
-
-/// The seqs of one run of a channel. Only gaps and repetitions count, not the order in which they came.
-using Seqs = std::vector<int64_t>;
 
 constexpr uint64_t kLargestGap = 1'000'000'000;
 
@@ -32,7 +31,7 @@ class Surveyor {
       take(*event);
     }
     survey_.damage = reader_.damage();
-    for (auto& [key, seqs] : seqs_) count_gaps(survey_.channels[key.first], seqs);
+    for (auto& [name, stamps] : stamps_) take_stamps(survey_.channels[name], stamps);
     return std::move(survey_);
   }
 
@@ -43,17 +42,20 @@ class Surveyor {
     if (channel.events++ == 0) channel.type = type_of(event);
     channel.bytes += event.data.size();
     const auto check = checks_.find(channel.type);
-    int64_t utime = event.timestamp_us;
     if (check != checks_.end() && event.data.size() >= 32) {  // a part of messages has no header
       if (check->second(event.data) != CheckResult::kOk) {
         ++channel.undecodable;
         return;
       }
       const Header header = *read_header(event.data);
-      utime = header.utime;
       channel.runs.insert(header.run);
-      seqs_[{name, header.run}].push_back(header.seq);
+      stamps_[name].push_back({header.run, header.seq, header.utime});
+    } else {
+      take_time(channel, event.timestamp_us);
     }
+  }
+
+  static void take_time(ChannelSurvey& channel, int64_t utime) {
     channel.first_utime = channel.first_utime == 0 ? utime : std::min(channel.first_utime, utime);
     channel.last_utime = std::max(channel.last_utime, utime);
   }
@@ -64,11 +66,25 @@ class Surveyor {
     return found == types_.end() ? "unknown" : found->second;
   }
 
-  static void count_gaps(ChannelSurvey& channel, Seqs& seqs) {
-    std::sort(seqs.begin(), seqs.end());
-    for (std::size_t i = 1; i < seqs.size(); ++i) {
+  static void take_stamps(ChannelSurvey& channel, std::vector<Stamp>& stamps) {
+    const std::vector<StampError> errors = stamp_errors(stamps);
+    channel.misstamped =
+        std::count_if(errors.begin(), errors.end(), [](StampError e) { return e != StampError::kNone; });
+    const std::vector<StampError> stray = stray_stamps(stamps);
+    for (std::size_t i = 0; i < stamps.size(); ++i) {
+      if (stray[i] == StampError::kNone) take_time(channel, stamps[i].utime);
+    }
+    count_gaps(channel, stamps);
+  }
+
+  /// Only gaps and repetitions count, not the order in which the messages came.
+  static void count_gaps(ChannelSurvey& channel, std::vector<Stamp>& stamps) {
+    std::sort(stamps.begin(), stamps.end(),
+              [](const Stamp& a, const Stamp& b) { return std::tie(a.run, a.seq) < std::tie(b.run, b.seq); });
+    for (std::size_t i = 1; i < stamps.size(); ++i) {
+      if (stamps[i].run != stamps[i - 1].run) continue;
       // Unsigned: a hostile log may hold the extremes. What is larger than any real gap counts as that.
-      const uint64_t step = static_cast<uint64_t>(seqs[i]) - static_cast<uint64_t>(seqs[i - 1]);
+      const uint64_t step = static_cast<uint64_t>(stamps[i].seq) - static_cast<uint64_t>(stamps[i - 1].seq);
       if (step == 0) ++channel.repeated;
       if (step > 1) channel.missing += static_cast<int64_t>(std::min<uint64_t>(step - 1, kLargestGap));
     }
@@ -77,15 +93,15 @@ class Surveyor {
   LogReader& reader_;
   std::map<int64_t, std::string> types_;
   std::map<std::string, MessageCheck> checks_;
-  std::map<std::pair<std::string, int64_t>, Seqs> seqs_;
+  std::map<std::string, std::vector<Stamp>> stamps_;
   LogSurvey survey_;
 };
 
 }  // namespace
 
 double ChannelSurvey::rate_hz() const {
-  const int64_t span_us = last_utime - first_utime;
-  return span_us > 0 ? static_cast<double>(events - 1) * 1e6 / static_cast<double>(span_us) : 0.0;
+  const double span_us = static_cast<double>(last_utime) - static_cast<double>(first_utime);
+  return span_us > 0.0 ? static_cast<double>(events - 1) * 1e6 / span_us : 0.0;
 }
 
 LogSurvey survey_log(LogReader& reader) { return Surveyor(reader).run(); }

@@ -14,11 +14,13 @@ struct ChannelSurvey {
   std::string type;  ///< of the first message; "unknown" where its fingerprint is none of ours
   int64_t events = 0;
   uint64_t bytes = 0;
-  int64_t first_utime = 0;  ///< by the messages' own time, where the type is ours; otherwise the events'
+  int64_t first_utime = 0;  ///< by the messages' own time, where the type is ours, without stray ones; otherwise the
+                            ///< events'
   int64_t last_utime = 0;
   int64_t undecodable = 0;  ///< of a type of ours, and broken; or of another type than the first
   int64_t missing = 0;      ///< gaps in seq
   int64_t repeated = 0;     ///< messages that are there twice
+  int64_t misstamped = 0;   ///< stamps that contradict their seq, or lie ages from the others (stray_stamps.h)
   std::set<int64_t> runs;
 
   [[nodiscard]] double rate_hz() const;
