@@ -9,7 +9,7 @@
 #include <roadfix/imu_t.hpp>
 #include <stdexcept>
 
-#include "bus/log/log_reader.h"
+#include "bus/log/log_survey.h"
 #include "bus/sample_codec.h"
 #include "bus/types/message.h"
 #include "bus/types/schema.h"
@@ -57,6 +57,7 @@ void each(LogReader& reader, const std::string& channel, const Use& use) {
 
 Drive read_drive(const Options& options, const Calibration& calibration) {
   LogReader reader(options.log);
+  require_our_log(reader);
   Drive drive;
   each<imu_t>(reader, "IMU", [&](const imu_t& m) {
     if (drive.imu.empty() || m.utime > drive.imu.back().t_us) drive.imu.push_back(imu_sample(m));

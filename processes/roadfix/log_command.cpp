@@ -34,6 +34,7 @@ void print_damage(const LogArguments& arguments, const std::vector<LogDamage>& d
 
 void print_info(const LogArguments& arguments) {
   LogReader reader(arguments.in);
+  reader.require_events();
   const LogSurvey survey = survey_log(reader);
   std::cout << fmt::format("{}: {} events, {} bytes\n", arguments.in, survey.events, reader.size_bytes());
   std::cout << fmt::format("{:<24} {:<16} {:>9} {:>9} {:>12} {:>9} {:>5}\n", "channel", "type", "events", "rate Hz",
@@ -43,12 +44,14 @@ void print_info(const LogArguments& arguments) {
                              channel.rate_hz(), channel.bytes,
                              static_cast<double>(channel.last_utime - channel.first_utime) * 1e-6, channel.runs.size());
   }
+  if (survey.ours() == 0) std::cout << "no message of a type of Roadfix's: another LCM user's log\n";
   print_damage(arguments, survey.damage);
 }
 
 /// Ends with status 1 where anything is broken or missing.
 void check_log(const LogArguments& arguments) {
   LogReader reader(arguments.in);
+  reader.require_events();
   const LogSurvey survey = survey_log(reader);
   print_damage(arguments, survey.damage);
   bool whole = survey.damage.empty();
@@ -61,7 +64,8 @@ void check_log(const LogArguments& arguments) {
   if (survey.backward_stamps > 0) {
     std::cout << fmt::format("{} events are stamped earlier than the one before; harmless\n", survey.backward_stamps);
   }
-  std::cout << fmt::format("{}: {} events, {}\n", arguments.in, survey.events, whole ? "whole" : "not whole");
+  std::cout << fmt::format("{}: {} events, {}{}\n", arguments.in, survey.events, whole ? "whole" : "not whole",
+                           survey.ours() == 0 ? " as a log, but none of them is a message of Roadfix's" : "");
   if (!whole) throw CLI::RuntimeError(1);
 }
 
@@ -70,6 +74,7 @@ template <class Wanted>
 void copy_log(const LogArguments& arguments, const Wanted& wanted) {
   refuse_to_replace(arguments.in, arguments.out);
   LogReader reader(arguments.in);
+  reader.require_events();
   LogWriter writer(arguments.out);
   int64_t events = 0;
   while (const std::optional<LogEvent> event = reader.next()) {

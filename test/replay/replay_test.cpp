@@ -155,6 +155,17 @@ TEST_CASE("a log without the stage's clock, or over itself, is an error that lea
   REQUIRE(events(folder / "killed.lcm.part", "IMU").size() == 100);
 }
 
+TEST_CASE("a log whose clock is of another type is an error, not an empty replay") {
+  TemporaryFolder folder;
+  std::vector<DriveMessage> drive = small_drive(1.0);
+  for (DriveMessage& m : drive) {
+    if (m.channel == "IMU") m = drive_message("IMU", m.header.utime, m.header.seq, gnss_t{});
+  }
+  write_drive(folder / "in.lcm", drive);
+  REQUIRE_THROWS_WITH(replay(folder / "in.lcm", folder / "out.lcm", stages({filter_spec()})),
+                      Catch::Contains("needs a message on IMU, and the log has none that can be decoded"));
+}
+
 TEST_CASE("damaged bytes in the input are counted and the rest is replayed") {
   TemporaryFolder folder;
   std::vector<DriveMessage> drive = small_drive(5.0);

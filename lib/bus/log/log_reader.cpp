@@ -63,6 +63,18 @@ std::optional<LogEvent> LogReader::next() {
   return std::nullopt;
 }
 
+void LogReader::require_events() {
+  rewind();
+  if (!next()) {
+    const bool begins =
+        file_.size() >= sizeof kMagicBytes && std::memcmp(file_.data(), kMagicBytes, sizeof kMagicBytes) == 0;
+    throw LogError(path_.string() + (file_.empty() ? ": is empty: a log without an event"
+                                     : begins      ? ": is cut off within its first event"
+                                                   : ": is no LCM log: no event in it"));
+  }
+  rewind();
+}
+
 LogEvent LogReader::at(uint64_t offset) const {
   const std::optional<LogEvent> event = parse_log_event(file_, offset);
   if (!event) throw LogError(path_.string() + ": no event at byte " + std::to_string(offset));

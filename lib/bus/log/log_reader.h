@@ -34,6 +34,9 @@ class LogReader {
 
   void rewind() { position_ = 0; }
 
+  /// Throws LogError, saying what the file is instead, where it holds no event at all. Stands at the beginning then.
+  void require_events();
+
   /// What next() has stepped over so far, in file order, each once.
   [[nodiscard]] const std::vector<LogDamage>& damage() const { return damage_; }
   [[nodiscard]] uint64_t size_bytes() const { return file_.size(); }

@@ -11,6 +11,8 @@ namespace roadfix {
 
 namespace {
 
+constexpr const char* kUnknown = "unknown";
+constexpr std::size_t kNamed = 5;  // channels of a log that is not ours
 constexpr uint64_t kLargestGap = 1'000'000'000;
 
 class Surveyor {
@@ -61,9 +63,9 @@ class Surveyor {
   }
 
   std::string type_of(const LogEvent& event) const {
-    if (event.data.size() < 8) return "unknown";
+    if (event.data.size() < 8) return kUnknown;
     const auto found = types_.find(read_int64(event.data.data()));
-    return found == types_.end() ? "unknown" : found->second;
+    return found == types_.end() ? kUnknown : found->second;
   }
 
   static void take_stamps(ChannelSurvey& channel, std::vector<Stamp>& stamps) {
@@ -104,6 +106,30 @@ double ChannelSurvey::rate_hz() const {
   return span_us > 0.0 ? static_cast<double>(events - 1) * 1e6 / span_us : 0.0;
 }
 
+int64_t LogSurvey::ours() const {
+  int64_t count = 0;
+  for (const auto& [name, channel] : channels) count += channel.type != kUnknown ? channel.events : 0;
+  return count;
+}
+
 LogSurvey survey_log(LogReader& reader) { return Surveyor(reader).run(); }
+
+void require_our_log(LogReader& reader) {
+  reader.require_events();
+  std::set<int64_t> ours;
+  for (const auto& [name, type] : Schema::built_in().types()) ours.insert(Schema::built_in().fingerprint(name));
+  std::set<std::string, std::less<>> channels;
+  while (const std::optional<LogEvent> event = reader.next()) {
+    if (event->data.size() >= 8 && ours.contains(read_int64(event->data.data()))) return reader.rewind();
+    if (channels.size() < kNamed + 1 && !channels.contains(event->channel)) channels.emplace(event->channel);
+  }
+  std::string text = reader.path().string() + ": an LCM log, but no message of a type of Roadfix's is in it: ";
+  std::size_t named = 0;
+  for (const std::string& channel : channels) {
+    text += (named == 0 ? "" : ", ") + (named < kNamed ? channel : std::string("..."));
+    ++named;
+  }
+  throw LogError(text);
+}
 
 }  // namespace roadfix

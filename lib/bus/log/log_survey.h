@@ -31,8 +31,14 @@ struct LogSurvey {
   int64_t events = 0;
   int64_t backward_stamps = 0;  ///< events stamped earlier than the one before
   std::vector<LogDamage> damage;
+
+  [[nodiscard]] int64_t ours() const;  ///< events of channels whose type is ours
 };
 
 LogSurvey survey_log(LogReader& reader);
+
+/// Throws LogError where the file is no log, holds no event, or none of a type of ours: another LCM user's. Stands at
+/// the beginning then. A log of ours tells at its first event.
+void require_our_log(LogReader& reader);
 
 }  // namespace roadfix

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "bus/log/log_index.h"
+#include "bus/log/log_survey.h"
 #include "bus/log/log_writer.h"
 #include "bus/log/output_place.h"
 #include "bus/log/stray_stamps.h"
@@ -75,6 +76,7 @@ class Replayer : public MessageSink {
 Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path& out,
                    std::vector<std::unique_ptr<Stage>> stages, const ReplayOptions& options)
     : options_(options), reader_(in), writer_(out), beginnings_(stages.size()), inboxes_(stages.size()) {
+  require_our_log(reader_);
   for (std::unique_ptr<Stage>& stage : stages) {
     runners_.push_back(std::make_unique<StageRunner>(std::move(stage), *this));
     if (options.timing) runners_.back()->measure_time();
@@ -156,13 +158,21 @@ void Replayer::route(std::size_t stage) {
 
 void Replayer::require_clock(const StageRunner& runner) const {
   std::string clocks;
+  bool broken = false;
   for (const ClockSpec& clock : runner.spec().clocks) {
     const std::string& channel = runner.spec().inputs[static_cast<std::size_t>(clock.input)].channel;
-    if (producers_.contains(channel) || index_.channel(channel) >= 0) return;
+    if (producers_.contains(channel)) return;
+    const int number = index_.channel(channel);
+    for (const IndexedMessage& message : index_.messages) {
+      if (message.channel != number) continue;
+      if (runner.can_decode(clock.input, reader_.at(message.offset).data)) return;
+      broken = true;
+    }
     clocks += (clocks.empty() ? "" : ", ") + channel;
   }
-  throw std::runtime_error(reader_.path().string() + ": " + runner.spec().name + " needs a message on " + clocks +
-                           ", and the log has none");
+  std::string text = reader_.path().string() + ": " + runner.spec().name + " needs a message on " + clocks;
+  text += broken ? ", and the log has none that can be decoded" : ", and the log has none";
+  throw std::runtime_error(text);
 }
 
 ReplaySummary Replayer::run() {

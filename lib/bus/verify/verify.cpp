@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "bus/log/log_survey.h"
 #include "bus/run/stage_runner.h"
 #include "bus/verify/output_difference.h"
 
@@ -87,6 +88,9 @@ VerifyReport verify(const std::vector<std::filesystem::path>& logs, const std::v
   for (const NewStage& stage : stages) {
     StageVerdict verdict = verify_stage(stage, readers);
     if (!verdict.runs.empty()) report.stages.push_back(std::move(verdict));
+  }
+  if (report.stages.empty()) {
+    for (LogReader* reader : readers) require_our_log(*reader);
   }
   for (const LogReader* reader : readers) {
     for (const LogDamage& damage : reader->damage()) {

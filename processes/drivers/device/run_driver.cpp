@@ -3,7 +3,7 @@
 #include <iostream>
 #include <roadfix/raw_t.hpp>
 
-#include "bus/log/log_reader.h"
+#include "bus/log/log_survey.h"
 #include "bus/log/log_writer.h"
 #include "bus/log/output_place.h"
 #include "bus/run/command_line.h"
@@ -80,6 +80,7 @@ DriverReplay replay_driver(const std::filesystem::path& in, const std::filesyste
   const MessageCheck check = Schema::built_in().check_of("raw_t");
   refuse_to_replace(in, out);
   LogReader reader(in);
+  require_our_log(reader);
   LogWriter writer(out);
   LogOutputs outputs(writer);
   RawReader raw_reader(setup, outputs);

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "bus/log/log_reader.h"
+#include "bus/log/log_survey.h"
 #include "bus/types/message.h"
 #include "bus/types/schema.h"
 #include "config/config.h"
@@ -186,6 +186,7 @@ const char* origin_name(int8_t origin) {
 
 EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels) {
   LogReader reader(path);
+  require_our_log(reader);
   LogCollector collector(path, channels);
   int undecodable = 0;
   while (const auto event = reader.next()) undecodable += collector.add(*event) ? 0 : 1;
