@@ -185,6 +185,26 @@ TEST_CASE("damaged bytes in the input are counted and the rest is replayed") {
   REQUIRE(events(folder / "out.lcm", "POSE_INS").size() == 500);
 }
 
+TEST_CASE("where a log has no clock, its first damage is named, and it alone") {
+  TemporaryFolder folder;
+  std::vector<DriveMessage> drive = small_drive(3.0);
+  std::erase_if(drive, [](const DriveMessage& m) { return m.channel == "IMU"; });
+  write_drive(folder / "in.lcm", drive);
+  std::string bytes = read_bytes(folder / "in.lcm");
+  std::vector<std::size_t> offsets;
+  {
+    LogReader reader(folder / "in.lcm");
+    while (const auto event = reader.next()) offsets.push_back(event->offset);
+  }
+  for (const std::size_t i : {10, 20, 30}) bytes[offsets[i]] = 'x';
+  std::ofstream(folder / "in.lcm", std::ios::binary) << bytes;
+  const std::string first = "damaged at byte " + std::to_string(offsets[10]) + " ";
+  const std::string second = std::to_string(offsets[20]);
+  REQUIRE_THROWS_WITH(replay(folder / "in.lcm", folder / "out.lcm", stages({filter_spec()})),
+                      Catch::Contains("needs a message on IMU") && Catch::Contains(first) &&
+                          Catch::EndsWith("in 2 more places") && !Catch::Contains(second));
+}
+
 TEST_CASE("one stray stamp costs its own message and none of the others") {
   TemporaryFolder folder;
   const std::vector<DriveMessage> drive = small_drive(10.0);
