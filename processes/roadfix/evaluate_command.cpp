@@ -68,7 +68,7 @@ EstimateInput estimate_input(const std::string& channel, PoseStream stream, cons
   input.trajectory = std::move(stream.trajectory);
   if (stream.backward + stream.other_frame > 0) {
     report.notes.push_back(
-        fmt::format("{}: {} poses that do not move forward in time and {} in another frame are left out", channel,
+        fmt::format("{}: {} poses for a time that has one already and {} in another frame are left out", channel,
                     stream.backward, stream.other_frame));
   }
   return input;

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "bus/log/log_survey.h"
+#include "bus/log/stray_stamps.h"
 #include "bus/types/message.h"
 #include "bus/types/schema.h"
 #include "config/config.h"
@@ -122,47 +124,80 @@ struct Checks {
   MessageCheck fusion = Schema::built_in().check_of("fusion_state_t");
 };
 
-/// What the log holds so far; add() says whether the event was a message of its channel's type.
+/// Collects what a log holds: add() takes note of an event and says whether it is a message of its channel's type;
+/// take() reads them in the order of their own time, whatever the order in the file.
 class LogCollector {
  public:
-  LogCollector(const std::filesystem::path& path, const std::set<std::string>& channels)
-      : path_(path), channels_(channels) {}
+  LogCollector(const LogReader& reader, const std::set<std::string>& channels) : reader_(reader), channels_(channels) {}
 
   bool add(const LogEvent& event) {
     const std::string channel(event.channel);
-    if (is_pose(channel)) return add_pose(channel, event);
-    if (channel == "CONFIG_DRIVE") {
-      if (checks_.config(event.data) != CheckResult::kOk) return false;
-      read_facts(decode<config_t>(event.data), path_, log_);
-    } else if (channel == "FUSION_STATE") {
-      if (checks_.fusion(event.data) != CheckResult::kOk) return false;
-      append(decode<fusion_state_t>(event.data), log_.fusion);
-    }
+    const bool config = channel == "CONFIG_DRIVE";
+    const bool fusion = channel == "FUSION_STATE";
+    if (!is_pose(channel) && !config && !fusion) return true;
+    const MessageCheck& check = config ? checks_.config : fusion ? checks_.fusion : checks_.pose;
+    if (check(event.data) != CheckResult::kOk) return false;
+    const Header header = *read_header(event.data);
+    Noted& noted = noted_[channel];
+    noted.stamps.push_back({header.run, header.seq, header.utime});
+    noted.offsets.push_back(event.offset);
     return true;
   }
 
   EvaluationLog take() {
-    for (auto& [channel, builder] : builders_) log_.poses.emplace(channel, builder.take());
+    for (auto& [channel, noted] : noted_) {
+      const std::vector<std::size_t> order = in_order(channel, noted);
+      StreamBuilder builder;
+      for (const std::size_t i : order) {
+        const LogEvent event = reader_.at(noted.offsets[i]);
+        if (channel == "CONFIG_DRIVE") {
+          read_facts(decode<config_t>(event.data), reader_.path(), log_);
+        } else if (channel == "FUSION_STATE") {
+          append(decode<fusion_state_t>(event.data), log_.fusion);
+        } else {
+          builder.add(decode<pose_t>(event.data), event.timestamp_us);
+        }
+      }
+      if (is_pose(channel)) log_.poses.emplace(channel, builder.take());
+    }
     return std::move(log_);
   }
 
  private:
+  struct Noted {
+    std::vector<Stamp> stamps;
+    std::vector<uint64_t> offsets;
+  };
+
   [[nodiscard]] bool is_pose(const std::string& channel) const {
     if (channel == kReferenceChannel) return true;
     return channels_.empty() ? channel.starts_with("POSE_") : channels_.contains(channel);
   }
 
-  bool add_pose(const std::string& channel, const LogEvent& event) {
-    if (checks_.pose(event.data) != CheckResult::kOk) return false;
-    builders_[channel].add(decode<pose_t>(event.data), event.timestamp_us);
-    return true;
+  /// By time, then as they were numbered. One stray stamp would reach over the whole time that is scored.
+  std::vector<std::size_t> in_order(const std::string& channel, const Noted& noted) {
+    const std::vector<StampError> errors = stray_stamps(noted.stamps);
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (errors[i] == StampError::kNone) order.push_back(i);
+    }
+    if (const std::size_t stray = errors.size() - order.size(); stray > 0) {
+      log_.notes.push_back(
+          fmt::format("{}: {} messages whose stamps contradict the others are left out", channel, stray));
+    }
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      const Stamp& x = noted.stamps[a];
+      const Stamp& y = noted.stamps[b];
+      return std::tie(x.utime, x.run, x.seq) < std::tie(y.utime, y.run, y.seq);
+    });
+    return order;
   }
 
-  const std::filesystem::path& path_;
+  const LogReader& reader_;
   const std::set<std::string>& channels_;
   Checks checks_;
   EvaluationLog log_;
-  std::map<std::string, StreamBuilder> builders_;
+  std::map<std::string, Noted> noted_;
 };
 
 /// The point of the vehicle in body axes, where the calibration tells.
@@ -187,7 +222,7 @@ const char* origin_name(int8_t origin) {
 EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels) {
   LogReader reader(path);
   require_our_log(reader);
-  LogCollector collector(path, channels);
+  LogCollector collector(reader, channels);
   int undecodable = 0;
   while (const auto event = reader.next()) undecodable += collector.add(*event) ? 0 : 1;
   EvaluationLog log = collector.take();

@@ -31,7 +31,7 @@ struct PoseStream {
   bool scale_unknown = false;
   int8_t origin = 0;    ///< pose_t::ORIGIN_*
   int other_frame = 0;  ///< poses left out: in another frame than the last one
-  int backward = 0;     ///< poses left out: not later than the one before
+  int backward = 0;     ///< poses left out: there already at that time
 };
 
 struct EvaluationLog {
@@ -43,7 +43,8 @@ struct EvaluationLog {
   std::vector<std::string> notes;  ///< what a reader of the figures must know: damage, missing facts
 };
 
-/// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE and FUSION_STATE.
+/// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE and FUSION_STATE, each in
+/// the order of its messages' own time. Throws LogError where the file is no log of ours.
 EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels);
 
 /// The stream in another ENU frame; a local stream stays as it is.

@@ -1,6 +1,8 @@
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <random>
 
+#include "bus/log/log_reader.h"
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/evaluate/report.h"
 #include "unit/evaluate_report/small_log.h"
@@ -188,6 +190,54 @@ TEST_CASE("a repeated stretch, a change of frame and bytes that are no message a
   CHECK(stream.reasons.size() == stream.trajectory.poses.size());
   REQUIRE(log.notes.size() == 1);
   CHECK(log.notes[0].find("1 messages") != std::string::npos);
+}
+
+TEST_CASE("the order of the events in a log changes no figure, and a stray stamp only its own message") {
+  const Folder folder("order");
+  const SmallLog small;
+  {
+    LogWriter writer(folder.file("in.lcm"));
+    small.write_drive(writer);
+    int64_t seq = 0;
+    small.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
+      m.position_m[2] += 0.1 * std::sin(t_s);
+      m.seq = seq++;
+    });
+    writer.commit();
+  }
+  struct Event {
+    std::string channel;
+    std::vector<uint8_t> bytes;
+  };
+  std::vector<Event> events;
+  LogReader reader(folder.file("in.lcm"));
+  while (const auto event = reader.next())
+    events.push_back({std::string(event->channel), {event->data.begin(), event->data.end()}});
+  const auto figures = [&](const std::string& name) {
+    {
+      LogWriter writer(folder.file(name));
+      for (const Event& event : events) writer.write(event.channel, read_header(event.bytes)->utime, event.bytes);
+      writer.commit();
+    }
+    return report_json(evaluate_all(folder.file(name)));
+  };
+  const auto in_order = figures("a.lcm");
+  std::mt19937 random(5);
+  std::shuffle(events.begin(), events.end(), random);
+  CHECK(figures("b.lcm") == in_order);
+  for (Event& event : events) {
+    if (event.channel != "POSE_INS") continue;
+    pose_t m = decode<pose_t>(event.bytes);
+    if (m.seq != 2000) continue;
+    m.utime += 365LL * 86'400'000'000;
+    event.bytes = encode(m);
+  }
+  const auto stray = figures("c.lcm");
+  CHECK(stray["channels"]["POSE_INS"]["poses"] == 5000);
+  CHECK(stray["channels"]["POSE_INS"]["availability"] == in_order["channels"]["POSE_INS"]["availability"]);
+  CHECK(stray["channels"]["POSE_INS"]["scored"].get<int>() + 1 >=
+        in_order["channels"]["POSE_INS"]["scored"].get<int>());
+  CHECK(stray["notes"].size() == 1);
 }
 
 TEST_CASE("modes and weights come from the fusion's state by name") {
