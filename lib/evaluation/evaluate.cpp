@@ -209,6 +209,40 @@ std::vector<PathPoint> thinned_path(const Trajectory& trajectory) {
   return path;
 }
 
+std::string seconds_text(int64_t from_us, int64_t to_us) {
+  const auto tenths = std::llround(seconds_between(from_us, to_us) * 10.0);
+  return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " s";
+}
+
+/// Why the estimate and the reference have no time in common that may be scored.
+std::string lack_of_pairs(const Reference& reference, const DriveFacts& facts, const Trajectory& estimate) {
+  const auto& poses = estimate.poses;
+  if (poses.empty()) return "it has no poses";
+  const auto is_invalid = [](const Odometry& pose) { return pose.validity == Validity::kInvalid; };
+  if (std::all_of(poses.begin(), poses.end(), is_invalid)) return "all its poses are invalid";
+  const auto& truth = reference.trajectory.poses;
+  if (truth.empty()) return "the reference has no poses";
+  if (poses.back().t_us < truth.front().t_us)
+    return "it ends " + seconds_text(poses.back().t_us, truth.front().t_us) + " before the reference begins";
+  if (poses.front().t_us > truth.back().t_us)
+    return "it begins " + seconds_text(truth.back().t_us, poses.front().t_us) + " after the reference ends";
+  const auto pairs = associate(estimate, reference.trajectory, facts.reference.from_fixes);
+  if (pairs.empty()) return "where it is valid there is no reference close by in time";
+  const auto [begin_us, end_us] = scored_time(reference, facts);
+  if (pairs.back().reference.t_us < begin_us)
+    return "its last valid pose is " + seconds_text(pairs.back().reference.t_us, begin_us) +
+           " before the first that is scored";
+  return facts.score_withheld_only ? "no fix that was withheld lies where it is valid"
+                                   : "no part of the reference that may be scored lies where it is valid";
+}
+
+std::string lack_of_alignment(const ChannelScore& report, const ReferenceKind& kind) {
+  const std::string name = name_of(report.alignment);
+  if (report.alignment == Alignment::kTied && !kind.attitude) return "to be tied, both need an attitude";
+  if (report.scored.size() < 3) return "fewer than three poses can be compared, too few for the alignment " + name;
+  return "it moves too little to determine the alignment " + name;
+}
+
 }  // namespace
 
 std::pair<int64_t, int64_t> scored_time(const Reference& reference, const DriveFacts& facts) {
@@ -241,8 +275,10 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
   }
   const auto S = chosen_similarity(report, facts, kind, options);
   const std::vector<PosePair> unaligned = report.scored;
+  if (report.scored.empty()) report.no_figures = lack_of_pairs(reference, facts, estimate.trajectory);
   if (!S) {
-    report.scored.clear();  // an alignment that the data does not determine: nothing is scored, and pairs says so
+    if (report.no_figures.empty()) report.no_figures = lack_of_alignment(report, kind);
+    report.scored.clear();
   } else {
     report.similarity = *S;
     transform_estimates(*S, report.scored);

@@ -87,6 +87,8 @@ struct ChannelScore {
   Availability availability;
   std::optional<Summary> latency;  ///< s
 
+  std::string no_figures;  ///< why nothing is scored; empty where something is
+
   std::vector<PosePair> scored;  ///< after alignment
   std::vector<PoseError> errors;
   std::vector<SigmaSample> sigmas;

@@ -115,6 +115,7 @@ Json channel_json(const ChannelScore& c) {
                {"distance_m", c.distance_m},
                {"ate_rmse_m", c.ate_rmse},
                {"ate_mean_m", c.ate_mean}};
+  if (!c.no_figures.empty()) json["no_figures"] = c.no_figures;
   Json aligned = Json::object();
   for (const AlignedAte& a : c.ate_by_alignment) {
     aligned[name_of(a.alignment)] = {

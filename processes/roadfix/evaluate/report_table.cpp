@@ -103,6 +103,7 @@ std::string channel_text(const ChannelScore& c) {
   if (c.alignment == Alignment::kSim3) text += fmt::format(", scale {}", number(c.similarity.scale));
   if (c.delay_s != 0.0) text += fmt::format(", reference {:.3f} s late (fitted)", c.delay_s);
   text += fmt::format("\n  {} scored of {} poses, {:.0f} s, {:.0f} m\n", c.pairs, c.poses, c.duration_s, c.distance_m);
+  if (!c.no_figures.empty()) text += "  no figures: " + c.no_figures + "\n";
   if (c.pairs > 0) text += axes_rows(c.axes) + honesty_rows(c.honesty) + trajectory_lines(c);
   text += outage_lines(c);
   const Availability& a = c.availability;

@@ -222,6 +222,46 @@ TEST_CASE("without an estimate everything is silent and nothing is scored") {
   const ChannelScore report = evaluate_channel(exact_reference(), exact_facts(), estimate_of({}), {});
   CHECK(report.pairs == 0);
   CHECK(report.availability.silent == Approx(1.0));
+  CHECK(report.no_figures == "it has no poses");
+}
+
+TEST_CASE("an estimate without figures says why") {
+  using Catch::Matchers::Contains;
+  const Reference reference = exact_reference();
+  const int64_t end_us = reference.trajectory.poses.back().t_us;
+  const auto why = [&](Trajectory trajectory, DriveFacts facts, std::optional<Alignment> alignment = {}) {
+    EvaluationOptions options;
+    options.alignment = alignment;
+    const ChannelScore score = evaluate_channel(reference, facts, estimate_of(std::move(trajectory)), options);
+    CHECK(score.no_figures.empty() == (score.pairs > 0));
+    return score.no_figures;
+  };
+  const auto moved = [](Trajectory trajectory, int64_t by_us) {
+    for (Odometry& pose : trajectory.poses) pose.t_us += by_us;
+    return trajectory;
+  };
+  const Trajectory good = eight_trajectory(10.0, 60.0, 0.1);
+  CHECK(why(good, exact_facts()).empty());
+  Trajectory bad = good;
+  for (Odometry& pose : bad.poses) pose.validity = Validity::kInvalid;
+  CHECK(why(bad, exact_facts()) == "all its poses are invalid");
+  CHECK(why(moved(good, -75 * kSecond), exact_facts()) == "it ends 15.0 s before the reference begins");
+  CHECK(why(moved(good, end_us), exact_facts()) == "it begins 10.0 s after the reference ends");
+  DriveFacts late = exact_facts();
+  late.score.skip_s = 80.0;
+  CHECK_THAT(why(good, late), Contains("its last valid pose is 20.0 s before the first that is scored"));
+  DriveFacts withheld = exact_facts();
+  withheld.score_withheld_only = true;
+  CHECK_THAT(why(good, withheld), Contains("no fix that was withheld"));
+  Trajectory standing = good;
+  for (Odometry& pose : standing.poses) pose.T_frame_vehicle.p.setZero();
+  CHECK_THAT(why(standing, exact_facts(), Alignment::kYaw), Contains("moves too little"));
+  Trajectory two = good;
+  two.poses.resize(2);
+  CHECK_THAT(why(two, exact_facts(), Alignment::kSe3), Contains("fewer than three"));
+  DriveFacts blind = exact_facts();
+  blind.reference.attitude = false;
+  CHECK_THAT(why(good, blind, Alignment::kTied), Contains("attitude"));
 }
 
 }  // namespace
