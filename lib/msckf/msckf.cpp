@@ -200,7 +200,11 @@ bool Msckf::use(const SeenFrame& frame) {
   const int64_t t_us = picture_us(frame);
   standing_.add(frame);
   num_seen_ = static_cast<int>(frame.points.size());
-  if (phase_ != MsckfPhase::kRunning && !start_standing(t_us)) return !plan_moving(t_us);
+  if (phase_ != MsckfPhase::kRunning && !start_standing(t_us)) {
+    if (plan_moving(t_us)) return false;
+    watch(frame);
+    return true;
+  }
   if (t_us < state_.imu.t_us) return true;
   propagate(t_us);
   stands_ = standing_.stands(t_us, state_.imu.v.norm());

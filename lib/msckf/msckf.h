@@ -27,7 +27,7 @@
 namespace roadfix {
 
 enum class MsckfPhase { kStarting, kRunning, kLost };
-enum class MsckfScale { kUnknown, kInertial, kWheels, kIns };
+enum class MsckfScale { kUnknown, kInertial, kWheels, kIns, kStereo };
 
 /// A pose to begin again at.
 struct MsckfRestart {
@@ -59,6 +59,13 @@ struct KnownSpeed {
   MsckfScale from = MsckfScale::kInertial;
 };
 
+/// How fast it goes, by two eyes, for a start in motion.
+struct KnownVelocity {
+  int64_t t_us = 0;
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();    ///< m/s, of the imu in its axes
+  Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();  ///< (m/s)2
+};
+
 /// Where a start in motion begins.
 struct Beginning {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), v = Eigen::Vector3d::Zero();  ///< imu axes
@@ -71,7 +78,8 @@ struct MovingStart {
   int64_t t_us = 0;
   int64_t length_us = 0;  ///< of what will be gone through
   Beginning at;
-  double speed_std = 0.0, side_std = 0.0, tilt_std = 0.0;
+  Eigen::Matrix3d cov_v = Eigen::Matrix3d::Zero();  ///< of the velocity, imu axes
+  double tilt_std = 0.0;
   MsckfScale scale = MsckfScale::kUnknown;
 };
 
@@ -147,6 +155,11 @@ class Msckf {
   /// Integrates the imu's samples from there to now.
   void carry(msckf::ImuState& x, int64_t from_us) const;
   [[nodiscard]] std::optional<msckf::KnownSpeed> speed_for_start(int64_t t_us) const;
+  /// What the eyes say of the velocity, as a plan begins with it.
+  [[nodiscard]] bool plan_by_eyes(int64_t t_us, msckf::MovingStart& plan) const;
+  void plan_by_speed(const msckf::KnownSpeed& known, msckf::MovingStart& plan) const;
+  /// Two eyes' velocity from a picture that no start will use, and the one before.
+  void watch(const msckf::SeenFrame& frame);
   void begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen::Vector3d& v_imu, double v_std,
                 double tilt_std);
   void judge(int64_t t_us);
@@ -172,6 +185,8 @@ class Msckf {
   std::deque<WheelSample> wheels_;
   std::optional<msckf::KnownSpeed> known_speed_, wheel_speed_;
   std::optional<msckf::MovingStart> planned_;
+  msckf::SeenFrame watched_;  ///< before a start, newest picture that watch() took
+  std::optional<msckf::KnownVelocity> by_eyes_;
 
   MsckfPhase phase_ = MsckfPhase::kStarting;
   MsckfScale scale_ = MsckfScale::kUnknown;

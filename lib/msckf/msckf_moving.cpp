@@ -4,6 +4,7 @@
 
 #include "geometry/so3.h"
 #include "msckf/msckf.h"
+#include "msckf/stereo_velocity.h"
 
 namespace roadfix {
 
@@ -17,10 +18,15 @@ constexpr double kTurnSpeed = 2.0;  // m/s
 // m/s2 along the way, standard deviation of everyday driving: what changes a speed between its sample and the start,
 // and what levelling takes for a slope.
 constexpr double kStartAccel = 1.5;
-constexpr int64_t kShortestUs = 1'000'000;  // of what is gone through; doubled until the speed is known
+// Of what is gone through; doubled until the speed is known. An INS says one speed, wheels and two eyes say it again.
+constexpr int64_t kShortestUs = 1'000'000, kShortestSaidUs = 500'000;
 constexpr int64_t kLongestUs = 4'000'000;
-constexpr double kSpeedKnown = 0.05;  // relative standard deviation, from which on single steps are linear enough
+// Standard deviation, relative or in m/s, from which on single steps are linear enough.
+constexpr double kSpeedKnown = 0.05, kSlowKnown = 0.1;
 constexpr int kPasses = 4;
+constexpr double kMaxPair_s = 0.5;  // between two pictures of both eyes
+// Of their velocity: most that it may be in doubt, as a share of it or in m/s, and what may be a still picture.
+constexpr double kEyesShare = 0.3, kEyesStd = 1.0, kEyesSlow = 1.0;
 
 }  // namespace
 
@@ -45,31 +51,75 @@ std::optional<KnownSpeed> Msckf::speed_for_start(int64_t t_us) const {
 bool Msckf::plan_moving(int64_t t_us) {
   const ImuBlock& block = standing_.block();
   if (block.end_us == 0 || seconds_between(block.end_us, t_us) > 2.1 * config_.trust.block_s) return false;
-  const std::optional<KnownSpeed> known = speed_for_start(t_us);
-  if (!known) {
+  MovingStart plan;
+  plan.t_us = t_us;
+  plan.at.camera = state_.camera;
+  plan.tilt_std = std::hypot(0.1, kStartAccel / config_.vehicle.gravity) + block.accel_wander / config_.vehicle.gravity;
+  if (const std::optional<KnownSpeed> known = speed_for_start(t_us)) {
+    plan_by_speed(*known, plan);
+  } else if (!plan_by_eyes(t_us, plan)) {
     reason_ = "moving; the scale is not yet known";
     return false;
   }
-  // What the mean specific force has besides gravity: the turn's lateral acceleration; the rest is doubt.
-  const Eigen::Vector3d turning(0.0, known->speed * block.gyro.z(), 0.0);
-  MovingStart plan;
-  plan.t_us = t_us;
-  plan.length_us = kShortestUs;
-  plan.at.up = (block.accel - turning).normalized();
-  // Wheels tell the axle's speed, an INS and the turn the imu's along its x axis; the axle does not slip.
-  const bool of_axle = known->from == MsckfScale::kWheels;
-  const Eigen::Vector3d ahead = state_.camera.R_imu_vehicle().col(0);
-  const Eigen::Vector3d arm = block.gyro.cross(state_.camera.p_imu_axle);
-  plan.at.v = (of_axle ? known->speed : (known->speed + arm.x()) / ahead.x()) * ahead - arm;
-  plan.at.camera = state_.camera;
-  const Eigen::Vector3d arm_std = std::abs(block.gyro.z()) * config_.vehicle.p_imu_axle_std;
-  plan.speed_std = std::hypot(known->sigma + 0.1, of_axle ? arm_std.y() : 0.0);
-  plan.side_std = std::hypot(0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known->speed), arm_std.x());
-  plan.tilt_std = std::hypot(0.1, kStartAccel / config_.vehicle.gravity) + block.accel_wander / config_.vehicle.gravity;
-  plan.scale = known->from;
+  const bool said_again = plan.scale == MsckfScale::kWheels || plan.scale == MsckfScale::kStereo;
+  plan.length_us = said_again ? kShortestSaidUs : kShortestUs;
   planned_ = plan;
   reason_ = "moving; the start is being measured";
   return true;
+}
+
+void Msckf::plan_by_speed(const KnownSpeed& known, MovingStart& plan) const {
+  const ImuBlock& block = standing_.block();
+  // What the mean specific force has besides gravity: the turn's lateral acceleration; the rest is doubt.
+  const Eigen::Vector3d turning(0.0, known.speed * block.gyro.z(), 0.0);
+  plan.at.up = (block.accel - turning).normalized();
+  // Wheels tell the axle's speed, an INS and the turn the imu's along its x axis; the axle does not slip.
+  const bool of_axle = known.from == MsckfScale::kWheels;
+  const Eigen::Vector3d ahead = state_.camera.R_imu_vehicle().col(0);
+  const Eigen::Vector3d arm = block.gyro.cross(state_.camera.p_imu_axle);
+  plan.at.v = (of_axle ? known.speed : (known.speed + arm.x()) / ahead.x()) * ahead - arm;
+  const Eigen::Vector3d arm_std = std::abs(block.gyro.z()) * config_.vehicle.p_imu_axle_std;
+  const double along = std::hypot(known.sigma + 0.1, of_axle ? arm_std.y() : 0.0);
+  const double aside = std::hypot(0.1 + (0.05 + config_.vehicle.mounting_std) * std::abs(known.speed), arm_std.x());
+  plan.cov_v = Eigen::Vector3d(along, aside, aside).cwiseAbs2().asDiagonal();
+  plan.scale = known.from;
+}
+
+bool Msckf::plan_by_eyes(int64_t t_us, MovingStart& plan) const {
+  if (!by_eyes_ || seconds_between(by_eyes_->t_us, t_us) > kSpeedAge_s) return false;
+  const Eigen::Vector3d& v = by_eyes_->v;
+  // What creeps may stand: first the pictures have to show that it does not.
+  if (v.norm() < kEyesSlow && !standing_.flow()) return false;
+  const double aged = kStartAccel * seconds_between(by_eyes_->t_us, t_us);
+  plan.cov_v = by_eyes_->cov + aged * aged * Eigen::Matrix3d::Identity();
+  if (std::sqrt(plan.cov_v.diagonal().maxCoeff()) > std::max(kEyesStd, kEyesShare * v.norm())) return false;
+  const ImuBlock& block = standing_.block();
+  plan.at.v = v;
+  plan.at.up = (block.accel - block.gyro.cross(v)).normalized();
+  plan.scale = MsckfScale::kStereo;
+  return true;
+}
+
+void Msckf::watch(const SeenFrame& frame) {
+  const auto& T_left_right = config_.vehicle.T_left_right;
+  const double dt = seconds_between(watched_.t_us, frame.t_us);
+  if (!T_left_right || (watched_.t_us != 0 && dt < config_.window.clone_interval)) return;
+  by_eyes_.reset();
+  const std::optional<StereoVelocity> seen =
+      watched_.t_us != 0 && dt < kMaxPair_s ? stereo_velocity(watched_, frame, *T_left_right, config_.window.sigma_px)
+                                            : std::nullopt;
+  if (seen) {
+    const Eigen::Matrix3d R = state_.camera.T_imu_camera.R();
+    const Eigen::Vector3d v = R * seen->velocity, rate = R * seen->rate;
+    const double turn_std = config_.vehicle.camera_turn_std, arm_std = rate.norm() * config_.vehicle.camera_std;
+    KnownVelocity known;
+    known.t_us = picture_us(frame) - static_cast<int64_t>(0.5e6 * dt);
+    known.v = v - rate.cross(state_.camera.T_imu_camera.p);
+    known.cov = R * seen->cov * R.transpose() + arm_std * arm_std * Eigen::Matrix3d::Identity();
+    known.cov += turn_std * turn_std * (v.squaredNorm() * Eigen::Matrix3d::Identity() - v * v.transpose());
+    by_eyes_ = known;
+  }
+  watched_ = frame;
 }
 
 bool Msckf::start_planned(int64_t until_us) {
@@ -99,7 +149,7 @@ bool Msckf::speed_known() const {
   const Eigen::Vector3d& v = state_.imu.v;
   // Along the way; in v = Exp(phi) v^ + nu phi does not change the speed.
   const double variance = v.normalized().dot(state_.P().block<3, 3>(kVel, kVel) * v.normalized());
-  return std::sqrt(variance) < kSpeedKnown * v.norm();
+  return std::sqrt(variance) < std::max(kSlowKnown, kSpeedKnown * v.norm());
 }
 
 void Msckf::go_through(const MovingStart& plan, const Beginning& at, int64_t end_us, bool fixed) {
@@ -110,17 +160,16 @@ void Msckf::go_through(const MovingStart& plan, const Beginning& at, int64_t end
 }
 
 void Msckf::begin_moving(const MovingStart& plan, const Beginning& at) {
-  begin_at(plan.t_us, at.up, at.v, plan.speed_std, plan.tilt_std);
+  begin_at(plan.t_us, at.up, at.v, 0.0, plan.tilt_std);
   state_.imu.gyro_bias = begun_gyro_bias_ = at.gyro_bias;
   state_.imu.accel_bias = at.accel_bias;
   state_.camera = at.camera;
   const Eigen::Matrix3d R = state_.imu.R();
-  const Eigen::Vector3d std(plan.speed_std, plan.side_std, plan.side_std);
   // The speed is known in vehicle axes, whatever the attitude is: by (M.1) R' v = R^' (v^ + nu), free of phi, (M.39).
   Eigen::MatrixXd& P = state_.P();
   P.middleRows<3>(kVel).leftCols<kBaseSize>().setZero();
   P.middleCols<3>(kVel).topRows<kBaseSize>().setZero();
-  P.block<3, 3>(kVel, kVel) = R * std.cwiseAbs2().asDiagonal() * R.transpose();
+  P.block<3, 3>(kVel, kVel) = R * plan.cov_v * R.transpose();
   scale_ = plan.scale;
 }
 

@@ -10,6 +10,8 @@ using namespace msckf;
 
 namespace {
 
+constexpr size_t kMost = 1'000'000;
+
 /// The number of things, then each.
 template <class Archive, class List, class Each>
 void list(Archive& a, List& items, size_t most, const Each& each) {
@@ -38,6 +40,12 @@ void point(Archive& a, SeenPoint& p) {
 }
 
 template <class Archive>
+void frame(Archive& a, SeenFrame& f) {
+  a(f.t_us);
+  list(a, f.points, kMost, [&](SeenPoint& p) { point(a, p); });
+}
+
+template <class Archive>
 void imu_sample(Archive& a, ImuSample& s) {
   a(s.t_us, s.gyro, s.accel);
 }
@@ -46,8 +54,6 @@ template <class Archive>
 void calibrated(Archive& a, Calibrated& c) {
   a(c.T_imu_camera.q.coeffs(), c.T_imu_camera.p, c.lens, c.time_offset, c.wheel_scale, c.mounting, c.p_imu_axle);
 }
-
-constexpr size_t kMost = 1'000'000;
 
 }  // namespace
 
@@ -91,10 +97,10 @@ void Standing::serialise(Archive& a) {
 
 template <class Archive>
 void ClockSearch::serialise(Archive& a) {
-  a(searching_, sigma_, until_search_, last_.t_us);
+  a(searching_, sigma_, until_search_);
+  frame(a, last_);
   list(a, angles_, kMost, [&](Angle& angle) { a(angle.t_us, angle.angle); });
   list(a, turns_, kMost, [&](Turn& turn) { a(turn.from_us, turn.to_us, turn.rate); });
-  list(a, last_.points, kMost, [&](SeenPoint& p) { point(a, p); });
 }
 
 template <class Archive>
@@ -104,10 +110,7 @@ void Msckf::serialise(Archive& a) {
   standing_.serialise(a);
   clock_.serialise(a);
   list(a, imu_, kMost, [&](ImuSample& s) { imu_sample(a, s); });
-  list(a, frames_, kMost, [&](SeenFrame& f) {
-    a(f.t_us);
-    list(a, f.points, kMost, [&](SeenPoint& p) { point(a, p); });
-  });
+  list(a, frames_, kMost, [&](SeenFrame& f) { frame(a, f); });
   list(a, wheels_, kMost, [&](WheelSample& w) {
     a(w.t_us, w.direction, w.num_speeds);
     for (double& speed : w.speeds) a(speed);
@@ -116,10 +119,11 @@ void Msckf::serialise(Archive& a) {
   for (std::optional<KnownSpeed>* speed : {&known_speed_, &wheel_speed_})
     optional(a, *speed, [&](KnownSpeed& s) { a(s.t_us, s.speed, s.sigma, s.from); });
   optional(a, planned_, [&](MovingStart& s) {
-    a(s.t_us, s.length_us, s.at.up, s.at.v, s.at.gyro_bias, s.at.accel_bias, s.speed_std, s.side_std, s.tilt_std,
-      s.scale);
+    a(s.t_us, s.length_us, s.at.up, s.at.v, s.at.gyro_bias, s.at.accel_bias, s.cov_v, s.tilt_std, s.scale);
     calibrated(a, s.at.camera);
   });
+  frame(a, watched_);
+  optional(a, by_eyes_, [&](KnownVelocity& s) { a(s.t_us, s.v, s.cov); });
   a(phase_, scale_, reason_, stands_, reset_counter_, reset_delta_.q.coeffs(), reset_delta_.p, last_pose_.q.coeffs(),
     last_pose_.p, next_clone_, clone_us_, next_wheels_us_, next_sideslip_us_, next_planar_us_, next_zero_us_,
     stands_since_us_, zero_us_, begun_gyro_bias_, used_us_, doubtful_us_, used_share_, num_seen_);

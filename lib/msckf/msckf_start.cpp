@@ -97,6 +97,8 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   tracks_.clear();
   propagation_.clear();
   planned_.reset();
+  watched_ = {};
+  by_eyes_.reset();
   phase_ = MsckfPhase::kRunning;
   reason_.clear();
   used_us_ = t_us;
