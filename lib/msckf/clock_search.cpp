@@ -7,9 +7,9 @@ namespace roadfix::msckf {
 
 namespace {
 
-constexpr double kKnown_s = 0.03;   // standard deviation, below which the filter finds the rest by itself
-constexpr double kSigmas = 3.0;     // of the calibration's, searched, and
-constexpr double kBeside_s = 0.05;  // beyond: a minimum has two sides
+constexpr double kKnown_s = kSilentClockStd;  // standard deviation, up to which the filter finds the rest by itself
+constexpr double kSigmas = 3.0;               // of the calibration's, searched, and
+constexpr double kBeside_s = 0.05;            // beyond: a minimum has two sides
 constexpr double kStep_s = 0.01;
 constexpr double kMaxPair_s = 0.5;   // between two pictures
 constexpr double kRateStd = 0.01;    // rad/s, beyond twice of which a rate counts less

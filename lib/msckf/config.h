@@ -9,6 +9,10 @@
 
 namespace roadfix {
 
+/// s, standard deviation of a camera's time offset of which the calibration is silent: exposure, transport and two
+/// clocks. As much as the filter finds without searching for it, (M.47).
+inline constexpr double kSilentClockStd = 0.03;
+
 /// Facts of the sensors and of how they sit; a wide sigma says that something is to be estimated, a zero that it is
 /// known.
 struct MsckfVehicle {

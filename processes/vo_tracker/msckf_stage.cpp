@@ -62,7 +62,7 @@ MsckfVehicle msckf_vehicle(const Calibration& calibration) {
   }
   const CameraCalibration& left = *calibration.sensors.camera_left;
   take_known(left.time_offset, v.time_offset);
-  take_known(left.time_offset_std, v.time_offset_std);
+  v.time_offset_std = left.time_offset_std.value_or(kSilentClockStd);
   take_known(left.stamp_jitter, v.stamp_jitter);
   take_known(left.rate, v.camera_rate);
   take_known(left.mounting->std, v.camera_std);

@@ -113,6 +113,15 @@ TEST_CASE("mode msckf: the calibration tells where the axle is and how the imu i
   CHECK(msckf_vehicle(told).axle_std == 0.0);
 }
 
+TEST_CASE("mode msckf: a calibration silent about the camera's clock leaves it in doubt, one that tells it does not") {
+  Calibration c = calibration();
+  CHECK(msckf_vehicle(c).time_offset_std == kSilentClockStd);
+  for (const double told : {0.0, 0.002, 0.3}) {
+    c.sensors.camera_left->time_offset_std = told;
+    CHECK(msckf_vehicle(c).time_offset_std == told);
+  }
+}
+
 TEST_CASE("mode msckf: valid while parked, then follows the street") {
   const Collector out = run(drive(0));
   const auto poses = out.all<pose_t>("POSE_VO");
