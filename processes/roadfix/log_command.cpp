@@ -89,6 +89,11 @@ void copy_log(const LogArguments& arguments, const Wanted& wanted) {
 
 /// By the messages' own time, where they have one; in seconds after the earliest.
 void cut_log(const LogArguments& arguments) {
+  if (!(arguments.from_s < arguments.to_s)) {
+    throw std::runtime_error(
+        fmt::format("--from-s {} --to-s {}: the stretch ends before it begins; nothing would be left", arguments.from_s,
+                    arguments.to_s));
+  }
   const auto time_of = [](const LogEvent& event) {
     const std::optional<Header> header = read_header(event.data);
     // A message of another origin has no utime at that place: an hour from its stamp is no utime.
