@@ -213,7 +213,10 @@ Fault parse_fault(const std::string& text) {
   const std::size_t plus = when.find('+');
   const double start = parse_number(when.substr(0, plus), text);
   const double duration = plus == std::string_view::npos ? kWholeDrive : parse_number(when.substr(plus + 1), text);
-  if (start < 0.0 || duration < 0.0) throw std::invalid_argument("fault " + text + ": times are not negative");
+  const auto is_time = [](double t_s) { return t_s >= 0.0 && t_s <= kWholeDrive; };  // no NaN either
+  if (!is_time(start) || !is_time(duration)) {
+    throw std::invalid_argument("fault " + text + ": times are not negative, and at most 1e6 s");
+  }
   Fault fault(*type, start, duration);
   if (colon != std::string_view::npos) parse_parameters(all.substr(colon + 1), text, fault);
   return fault;

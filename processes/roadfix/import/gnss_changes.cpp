@@ -11,6 +11,10 @@
 namespace roadfix {
 namespace {
 
+constexpr double kShortestCut = 1e-3;    // s
+constexpr double kLongestChange = 1e6;   // s, eleven days: longer than any drive
+constexpr double kFarthestChange = 1e6;  // m
+
 struct Window {
   int64_t start_us = 0;
   int64_t end_us = 0;
@@ -34,12 +38,20 @@ void require(bool ok, const char* message) {
 }
 
 void check(const GnssChanges& changes) {
+  // Comparisons that hold, so that a NaN fails each.
+  const auto time = [](double seconds) { return seconds >= 0.0 && seconds <= kLongestChange; };
+  const auto way = [](double moved) { return std::abs(moved) <= kFarthestChange; };
   require(changes.keep_every >= 1, "--gnss-every must be at least 1");
   if (changes.cut) {
-    require(changes.cut->length > 0.0, "--cut-gnss must be longer than 0 s");
-    require(changes.cut->every >= changes.cut->length, "--every must not be shorter than --cut-gnss");
-    require(changes.cut->after >= 0.0 && changes.cut->phase >= 0.0, "--after and --phase must not be negative");
+    require(changes.cut->length >= kShortestCut && time(changes.cut->length),
+            "--cut-gnss must be within 0.001 and 1e6 s");
+    require(changes.cut->every >= changes.cut->length && time(changes.cut->every),
+            "--every must not be shorter than --cut-gnss, nor longer than 1e6 s");
+    require(time(changes.cut->after) && time(changes.cut->phase), "--after and --phase must be within 0 and 1e6 s");
   }
+  require(!changes.spike || way(changes.spike->moved), "--gnss-spike must be within -1e6 and 1e6 m");
+  require(!changes.bias_after_outage || way(changes.bias_after_outage->moved),
+          "--gnss-bias-after-outage must be within -1e6 and 1e6 m");
   require(!changes.spike || changes.spike->every_fix >= 1, "--every-fix must be at least 1");
   require(!changes.bias_after_outage || changes.cut, "--gnss-bias-after-outage needs --cut-gnss");
   require(!changes.bias_after_outage || changes.bias_after_outage->fixes >= 1, "--fixes must be at least 1");

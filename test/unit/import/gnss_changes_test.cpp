@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 
 #include "geodesy/enu_anchor.h"
 #include "geometry/frames.h"
@@ -137,7 +138,33 @@ TEST_CASE("changes that make no sense are refused") {
   changes.bias_after_outage = GnssBias{15.0, 5};
   CHECK_THROWS_WITH(change_gnss(fixes(10, 1), changes), "--gnss-bias-after-outage needs --cut-gnss");
   changes.cut = CutGnss{10.0, 5.0, 20.0, 0.0};
-  CHECK_THROWS_WITH(change_gnss(fixes(10, 1), changes), "--every must not be shorter than --cut-gnss");
+  CHECK_THROWS_WITH(change_gnss(fixes(10, 1), changes),
+                    Catch::StartsWith("--every must not be shorter than --cut-gnss"));
+}
+
+TEST_CASE("changes that never end or go to infinity are refused") {
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const double wrong : {kInf, -kInf, kNan, 1e300}) {
+    CAPTURE(wrong);
+    for (const CutGnss& cut : {CutGnss{wrong, 30.0, 0.0, 0.0}, CutGnss{10.0, wrong, 0.0, 0.0},
+                               CutGnss{10.0, 30.0, wrong, 0.0}, CutGnss{10.0, 30.0, 0.0, wrong}}) {
+      GnssChanges changes;
+      changes.cut = cut;
+      CHECK_THROWS_AS(change_gnss(fixes(100, 1), changes), std::runtime_error);
+    }
+    GnssChanges changes;
+    changes.spike = GnssSpike{wrong, 3};
+    CHECK_THROWS_WITH(change_gnss(fixes(100, 1), changes), Catch::StartsWith("--gnss-spike must be within"));
+    changes.spike.reset();
+    changes.cut = CutGnss{10.0, 30.0, 0.0, 0.0};
+    changes.bias_after_outage = GnssBias{wrong, 3};
+    CHECK_THROWS_WITH(change_gnss(fixes(100, 1), changes),
+                      Catch::StartsWith("--gnss-bias-after-outage must be within"));
+  }
+  GnssChanges changes;
+  changes.cut = CutGnss{1e-12, 1e-12, 0.0, 0.0};  // a billion windows in a millisecond
+  CHECK_THROWS_WITH(change_gnss(fixes(100, 1), changes), Catch::StartsWith("--cut-gnss must be within"));
 }
 
 }  // namespace

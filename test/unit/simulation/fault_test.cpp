@@ -293,6 +293,13 @@ TEST_CASE("faults as text: both ways, and errors that say what may be there") {
   CHECK_THAT(error("gnss.bias@x"), Contains("\"x\" is no number"));
   CHECK_THAT(error("gnss.drop@1:probability=2"), Contains("within [0"));
   CHECK_THAT(error("gnss.bias@3+-4"), Contains("not negative"));
+  for (const char* never : {"nan", "inf", "-inf", "1e300"}) {
+    CAPTURE(never);
+    CHECK_THAT(error("gnss.silence@" + std::string(never)), Contains("at most 1e6 s"));
+    CHECK_THAT(error("gnss.silence@3+" + std::string(never)), Contains("at most 1e6 s"));
+    CHECK_THAT(error("gnss.bias@3:east_m=" + std::string(never)), Contains("must be within"));
+    CHECK_THAT(error("gnss.ramp@3:north_mps=" + std::string(never)), Contains("must be within"));
+  }
 }
 
 }  // namespace
