@@ -60,6 +60,8 @@ image_t to_message(const FrameFile& frame) {
   message.size_bytes = static_cast<int32_t>(bytes.size());
   const auto header = read_image_header(message.data);
   if (!header) throw ConfigError(frame.path.string(), 0, "is neither a JPEG nor a PNG picture, or is cut short");
+  if (!has_image_end(message.data, header->kind))
+    throw ConfigError(frame.path.string(), 0, "is cut short: the end of the picture is missing");
   message.format = header->kind == ImageHeader::Kind::kPng ? image_t::FORMAT_PNG : image_t::FORMAT_JPEG;
   message.width_px = header->width_px;
   message.height_px = header->height_px;

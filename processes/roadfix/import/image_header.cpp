@@ -39,7 +39,42 @@ std::optional<ImageHeader> jpeg_header(std::span<const uint8_t> bytes) {
   return std::nullopt;
 }
 
+/// Chunk by chunk: length, type, data, checksum (section 5.3).
+bool has_png_end(std::span<const uint8_t> bytes) {
+  constexpr std::array<uint8_t, 4> kEnd = {'I', 'E', 'N', 'D'};
+  std::size_t at = 8;
+  while (at + 12 <= bytes.size()) {
+    const std::size_t next = at + 12 + big_endian(bytes, at, 4);
+    if (std::equal(kEnd.begin(), kEnd.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at) + 4))
+      return next <= bytes.size();
+    at = next;
+  }
+  return false;
+}
+
+/// Segment by segment (annex B): a thumbnail inside one has an end of its own. After a scan's header come coded data,
+/// in which a marker is 0xFF before anything but 0, a fill byte or a restart marker (0xD0 to 0xD7).
+bool has_jpeg_end(std::span<const uint8_t> bytes) {
+  constexpr unsigned kEnd = 0xD9;
+  std::size_t at = 2;
+  while (at + 1 < bytes.size()) {
+    const unsigned marker = bytes[at + 1];
+    if (bytes[at] != 0xFF || marker == 0xFF || marker == 0 || (marker >= 0xD0 && marker <= 0xD7)) {
+      ++at;
+      continue;
+    }
+    if (marker == kEnd) return true;
+    if (at + 4 > bytes.size()) return false;
+    at += 2 + big_endian(bytes, at + 2, 2);
+  }
+  return false;
+}
+
 }  // namespace
+
+bool has_image_end(std::span<const uint8_t> bytes, ImageHeader::Kind kind) {
+  return kind == ImageHeader::Kind::kPng ? has_png_end(bytes) : has_jpeg_end(bytes);
+}
 
 std::optional<ImageHeader> read_image_header(std::span<const uint8_t> bytes) {
   constexpr std::array<uint8_t, 8> kPngSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};

@@ -1,4 +1,4 @@
-/// Size and kind of a packed picture from its first bytes, without decoding it.
+/// Size and kind of a packed picture from its first bytes, and whether its last are there, without decoding it.
 #pragma once
 
 #include <cstdint>
@@ -16,5 +16,8 @@ struct ImageHeader {
 
 /// Nothing where the bytes are neither JPEG nor PNG, or end before the size is told.
 std::optional<ImageHeader> read_image_header(std::span<const uint8_t> bytes);
+
+/// Whether the picture has its end: PNG's IEND, JPEG's EOI. What is cut off before that decodes to grey.
+bool has_image_end(std::span<const uint8_t> bytes, ImageHeader::Kind kind);
 
 }  // namespace roadfix

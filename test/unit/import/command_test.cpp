@@ -94,6 +94,9 @@ TEST_CASE("a user's mistake ends with exit code 2 and a line that names it") {
       {"drive --out a.lcm --without radar", "--without"},
       {"drive --out a.lcm --cut-gnss 1", "--cut-gnss requires --every"},
       {"drive --out a.lcm --cut-gnss 5 --every 1", "roadfix: --every must not be shorter than --cut-gnss"},
+      {"drive --out a.lcm --cut-gnss inf --every inf", "--cut-gnss"},
+      {"drive --out a.lcm --cut-gnss 1 --every 5 --after nan", "--after"},
+      {"drive --out a.lcm --gnss-spike nan --every-fix 2", "--gnss-spike"},
       {"drive --out a.lcm --gnss-bias-after-outage 15", "--gnss-bias-after-outage requires --cut-gnss"},
       {"drive --out a.lcm --gnss-every 0", "--gnss-every"},
       {"drive --out a.lcm --gnss-every 2 --without gnss", "roadfix: there are no fixes to cut, thin out or move"},
@@ -107,6 +110,20 @@ TEST_CASE("a user's mistake ends with exit code 2 and a line that names it") {
     CHECK_THAT(outcome.text, Catch::Contains(words));
     CHECK_FALSE(fs::exists(folder / "a.lcm"));
   }
+}
+
+TEST_CASE("a picture whose end is missing stops an import with the file's name") {
+  const test::TemporaryFolder folder;
+  const fs::path drive = folder / "drive";
+  fs::create_directories(drive);
+  test::write_small_drive(drive);
+  const std::string whole = test::read_file(drive / "images/l1.png");
+  test::write_file(drive / "images/l1.png", whole.substr(0, whole.size() - 14));
+  const Outcome outcome = import(folder.path(), "drive --out a.lcm");
+  INFO(outcome.text);
+  CHECK(outcome.code == 2);
+  CHECK_THAT(outcome.text, Catch::Contains("drive/images/l1.png: is cut short"));
+  CHECK_FALSE(fs::exists(folder / "a.lcm"));
 }
 
 }  // namespace

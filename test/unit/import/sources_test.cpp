@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "config/config_error.h"
 #include "geometry/so3.h"
@@ -204,6 +205,33 @@ TEST_CASE("picture sizes are read from the first bytes and never beyond the last
   for (std::size_t n = 0; n < 20; ++n) CHECK_FALSE(header_of(png.substr(0, n)).has_value());
   for (std::size_t n = 0; n < 18; ++n) CHECK_FALSE(header_of(jpeg.substr(0, n)).has_value());
   CHECK_FALSE(header_of("GIF89a and so on, long enough to hold a size").has_value());
+}
+
+TEST_CASE("a picture whose end is missing is known as that, wherever it ends") {
+  const auto has_end = [](const std::string& bytes, ImageHeader::Kind kind) {
+    return has_image_end(std::span(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()), kind);
+  };
+  std::vector<uint8_t> pixels(96 * 64);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(i * i / 7);
+  const cv::Mat picture(64, 96, CV_8UC1, pixels.data());
+  for (const auto& [extension, kind] :
+       {std::pair(".png", ImageHeader::Kind::kPng), std::pair(".jpg", ImageHeader::Kind::kJpeg)}) {
+    CAPTURE(extension);
+    std::vector<uint8_t> packed;
+    REQUIRE(cv::imencode(extension, picture, packed, {cv::IMWRITE_JPEG_RST_INTERVAL, 4}));
+    const std::string file(packed.begin(), packed.end());
+    CHECK(has_end(file, kind));
+    CHECK(has_end(file + std::string(5, '\0'), kind));  // what a writer has put behind it harms nobody
+    for (std::size_t n = 0; n < file.size(); ++n) {
+      if (has_end(file.substr(0, n), kind)) FAIL(n << " of " << file.size() << " bytes have an end");
+    }
+    if (kind == ImageHeader::Kind::kPng) continue;
+    // A thumbnail in the first segment has an end of its own.
+    const std::string thumbnail = std::string("\xff\xe1\x00\x08", 4) + "ab\xff\xd9" + "cd";
+    const std::string with = file.substr(0, 2) + thumbnail + file.substr(2);
+    CHECK(has_end(with, kind));
+    CHECK_FALSE(has_end(with.substr(0, with.size() / 2), kind));
+  }
 }
 
 }  // namespace
