@@ -2,6 +2,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <csignal>
 #include <ctime>
 #include <iostream>
 
@@ -34,6 +35,7 @@ int record(const CommandLine& arguments, const std::string& folder) {
     return 0;
   }
   catch_stop_signals();
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is then an error like a full disk
   give_memory_back();
   if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
@@ -45,7 +47,7 @@ int record(const CommandLine& arguments, const std::string& folder) {
   unlimited.max_bytes = static_cast<std::size_t>(config.memory * kMebi);
   bus.subscribe(
       config.channels, [&](const BusMessage& message) { recording.push(message); }, unlimited);
-  std::cout << "recording to " << config.folder << "/" << name << ".*.lcm" << std::endl;
+  std::cout << "recording to " << config.folder << "/" << recording.name() << ".*.lcm" << std::endl;
 
   ServiceNotifier service;
   service.ready("recording to " + config.folder);

@@ -1,6 +1,7 @@
 #include "recorder/recording.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -23,6 +24,24 @@ std::pair<std::string, int64_t> place_of(const fs::path& log) {
   return {name.stem().string(), std::atoll(name.extension().string().substr(name.has_extension() ? 1 : 0).c_str())};
 }
 
+/// A clock that is not set begins each drive at the same second: what a drive before this one recorded stays.
+std::string unused_name(const fs::path& folder, const std::string& wanted) {
+  const auto used = [&](const std::string& name) {
+    return fs::exists(folder / (name + ".json")) || fs::exists(folder / (name + ".000.lcm"));
+  };
+  std::string name = wanted;
+  for (int i = 2; used(name); ++i) name = fmt::format("{}-{}", wanted, i);
+  return name;
+}
+
+/// MiB that a file may grow to: a limit of the system's (ulimit -f) splits, too, so that nothing is lost to it.
+double largest_file(double wanted) {
+  constexpr double kHead = 128.0;  // more than an event has beside its data
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_FSIZE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return wanted;
+  return std::min(wanted, (static_cast<double>(limit.rlim_cur) - kHead) / kMebi);
+}
+
 }  // namespace
 
 uint64_t free_space(const fs::path& folder) {
@@ -32,10 +51,12 @@ uint64_t free_space(const fs::path& folder) {
 }
 
 Recording::Recording(const RecorderConfig& config, const std::string& name, FreeSpace free)
-    : config_(config), folder_(config.folder), name_(name), free_(std::move(free)) {
+    : config_(config), folder_(config.folder), free_(std::move(free)) {
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error) throw LogError(folder_.string() + ": cannot make the folder for recordings: " + error.message());
+  name_ = unused_name(folder_, name);
+  config_.split_size = largest_file(config_.split_size);
   open_next();
   check_space();
 }

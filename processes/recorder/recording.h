@@ -25,7 +25,8 @@ class Recording {
  public:
   enum class State { kRecording, kStopped };
 
-  /// Makes the folder; throws LogError where that or the first file fails. `name` is usually the start's UTC time.
+  /// Makes the folder; throws LogError where that or the first file fails. `name` is usually the start's UTC time;
+  /// where there is a recording of that name, this one's ends in -2, -3 ...
   Recording(const RecorderConfig& config, const std::string& name, FreeSpace free = free_space);
   ~Recording();
   Recording(const Recording&) = delete;
@@ -49,6 +50,7 @@ class Recording {
   /// Everything on disk, sidecar last.
   void close();
 
+  [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] const std::string& reason() const { return reason_; }  ///< why it stopped
   [[nodiscard]] int64_t unwritten() const { return unwritten_; }       ///< messages that came after the stop

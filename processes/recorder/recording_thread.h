@@ -28,6 +28,7 @@ class RecordingThread {
   /// Why nothing is recorded; absent while it is.
   [[nodiscard]] std::optional<std::string> stopped() const;
   [[nodiscard]] const MessageQueue& queue() const { return queue_; }
+  [[nodiscard]] const std::string& name() const { return recording_.name(); }
   /// Only after finish().
   [[nodiscard]] const Recording& recording() const { return recording_; }
 

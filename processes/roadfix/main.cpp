@@ -1,5 +1,6 @@
 // The one command line tool. Each subcommand lives in a file of its own and adds itself here.
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <exception>
 #include <iostream>
 
@@ -15,6 +16,7 @@ constexpr int kUserError = 2;
 
 int main(int argc, char** argv) {
   roadfix::fix_eigen_blocking();
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is then an error like a full disk
   CLI::App app{"Roadfix: localization for road vehicles, replayable to the bit", "roadfix"};
   app.require_subcommand(1);
   roadfix::add_calibrate_command(app);

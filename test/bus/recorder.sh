@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Our recorder on real UDP, killed by SIGKILL or on a disk that is full: what it has written comes back, what is damaged
 # is said, and the exit status tells.
-#   recorder.sh BIN killed|full
+# A limit on the size of files only splits.
+#   recorder.sh BIN killed|full|limited
 set -euo pipefail
 bin=$1; trouble=$2
 if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
@@ -19,6 +20,7 @@ printf 'min_free_gib: 0\nflush_interval_s: 0.1\n' >"$folder/vehicle/recorder.yam
 if [[ $trouble == full ]]; then
   mount -t tmpfs -o size=128k none "$disk" 2>/dev/null || { echo "skipped: no right to mount a small disk"; exit 0; }
 fi
+[[ $trouble == limited ]] && ulimit -f 100  # KiB
 "$bin/recorder" --config "$folder/vehicle" --folder "$disk" --bus "$url" >"$folder/out" 2>"$folder/err" & recorder=$!
 sleep 1
 "$bin/play_drive" "$url" "$seconds" >/dev/null & player=$!
@@ -29,6 +31,15 @@ else
 fi
 status=0; wait $recorder || status=$?
 wait $player || true
+if [[ $trouble == limited ]]; then
+  ulimit -f unlimited 2>/dev/null || true
+  [[ $status -eq 0 ]] || { cat "$folder/err"; fail "ended with $status"; }
+  [[ $(ls "$disk"/*.lcm | wc -l) -gt 1 ]] || fail 'the limit was not met'
+  total=0
+  for log in "$disk"/*.lcm; do total=$((total + $("$bin/roadfix" log info "$log" | sed -n 's/.*: \([0-9]*\) events.*/\1/p'))); done
+  [[ $total -gt 840 ]] || fail "only $total events came back"  # 847, as without a limit
+  echo "$total events in $(ls "$disk"/*.lcm | wc -l) files"; exit 0
+fi
 log=$(ls "$disk"/*.lcm)
 events() { "$bin/roadfix" log info "$1" 2>/dev/null | sed -n 's/.*: \([0-9]*\) events.*/\1/p'; }
 if [[ $trouble == killed ]]; then

@@ -44,6 +44,7 @@ refused 'is there and no log' simulate scenario.yaml --out scenario.yaml
 cmp -s "$config/calibration.yaml" calibration.yaml || fail 'the calibration is another one'
 [[ $(cksum <drive.lcm) == "$before" ]] || fail 'the input is another one'
 
+(ulimit -f 100; "$roadfix" "${replay[@]}" out.lcm >said 2>&1; [[ $? -eq 2 ]] && grep -q 'File too large' said) || fail 'a limit on the size of files'
 cp out.lcm whole.lcm  # a run that fails leaves the earlier one's output
 refused 'needs a message on' replay out.lcm --stages wheel_odometry --config "$config" --out whole.lcm
 cmp -s out.lcm whole.lcm || fail 'a failed run has touched the output'

@@ -1,8 +1,10 @@
 #include "recorder/recording.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
+#include <csignal>
 #include <fstream>
 #include <iomanip>
 #include <nlohmann/json.hpp>
@@ -170,6 +172,48 @@ TEST_CASE("a disk that takes no more ends the recording with a reason, not the p
   recording.split();
   CHECK(recording.state() == Recording::State::kStopped);
   CHECK_FALSE(recording.reason().empty());
+}
+
+TEST_CASE("a recording never takes the place of another that began at the same second") {
+  const Folder folder;
+  for (const char* name : {"a", "a-2", "a-3"}) {
+    Recording recording(folder.config(), "a");
+    CHECK(recording.name() == name);
+    for (int i = 0; i < 3; ++i) recording.write("GNSS", i + 1, {kData.data(), 10});
+    recording.close();
+  }
+  CHECK(events_in({folder.path() / "a.000.lcm"}) == 3);
+  CHECK(events_in({folder.path() / "a-2.000.lcm", folder.path() / "a-3.000.lcm"}) == 6);
+  CHECK(sidecar(folder.path() / "a-2.json")["files"][0]["name"] == "a-2.000.lcm");
+}
+
+TEST_CASE("a limit on the size of files splits a recording, and what is larger than it is an error") {
+  const Folder folder;
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_FSIZE, &before) == 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);  // as the recorder does
+  rlimit small = before;
+  small.rlim_cur = 250'000;
+  REQUIRE(::setrlimit(RLIMIT_FSIZE, &small) == 0);
+  std::string reason;
+  std::vector<fs::path> files;
+  {
+    Recording recording(folder.config(), "a");
+    for (int i = 0; i < 5; ++i) {
+      recording.write("GNSS", i + 1, kData);
+      recording.flush(i + 1);
+    }
+    files = recording.files();
+    reason = recording.reason();
+    recording.write("GNSS", 9, std::vector<uint8_t>(300'000, 1));
+    recording.flush(9);
+    CHECK_THAT(recording.reason(), Catch::Contains("File too large"));
+  }
+  REQUIRE(::setrlimit(RLIMIT_FSIZE, &before) == 0);
+  std::signal(SIGXFSZ, handler);
+  CHECK(reason.empty());
+  CHECK(files.size() == 3);
+  CHECK(events_in(files) == 5);
 }
 
 TEST_CASE("what was flushed survives the end of the program") {
