@@ -36,6 +36,7 @@ struct GnssInsStatus {
   int64_t bad_imu_samples = 0;
   bool imu_frozen = false;
   int64_t imu_gaps = 0;
+  int64_t wheel_scale_steps = 0;  ///< taken back, (M.50), (M.51)
 };
 
 struct GnssInsOutput {
@@ -174,7 +175,7 @@ class GnssIns {
   bool lost_ = false;                    // to be aligned again
   int reset_counter_ = 0;
   SE3 reset_delta_;
-  int64_t bad_imu_ = 0, gaps_ = 0;
+  int64_t bad_imu_ = 0, gaps_ = 0, wheel_scale_steps_ = 0;
   std::vector<AidingRecord> records_;
 };
 

@@ -143,6 +143,7 @@ GnssInsStatus GnssIns::status() const {
   if (s.gnss_reason.empty() && height_refused_since_us_ != 0) s.gnss_reason = kHeightContradicts;
   s.bad_imu_samples = bad_imu_;
   s.imu_gaps = gaps_;
+  s.wheel_scale_steps = wheel_scale_steps_;
   s.imu_frozen = monitor_.frozen();
   const double hold = config_.alignment.coasting_s;
   for (size_t i = 0; i < kAidingSources; ++i)

@@ -64,7 +64,7 @@ void GnssIns::serialise(Archive& a) {
     agreed_since_us_, recovered_at_us_, height_refused_since_us_, position_at_us_, fix_interval_, first_step_us_,
     unseen_, last_fix_us_, resumed_us_, last_fix_.latitude, last_fix_.longitude, last_fix_.height, told_us_,
     told_place_, told_velocity_, told_since_us_, contradiction_, lost_, reset_counter_, reset_delta_.p,
-    reset_delta_.q.coeffs(), bad_imu_, gaps_);
+    reset_delta_.q.coeffs(), bad_imu_, gaps_, wheel_scale_steps_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

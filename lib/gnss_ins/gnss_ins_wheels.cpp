@@ -17,10 +17,11 @@ void GnssIns::use_wheels(const Pending& p, AidingRecord& r) {
     P(kWheelScale, kWheelScale) += *share * *share;
     core_->replace_covariance(P);
     core_->follow_scale_steps();
+    ++wheel_scale_steps_;
     r = applier_.apply(*core_, p, gates_);
   } else if (r.status == AidingStatus::kAccepted) {
     refused_wheels_.accepted();
-    core_->mend_scale(config_.aiding.gate_sigma);
+    if (core_->mend_scale(config_.aiding.gate_sigma)) ++wheel_scale_steps_;
   }
 }
 

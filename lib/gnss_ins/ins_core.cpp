@@ -66,16 +66,17 @@ double InsCore::longest_age(bool wheels) const {
   return longest;
 }
 
-void InsCore::mend_scale(double sigmas) {
+bool InsCore::mend_scale(double sigmas) {
   if (!scale_steps_.most_likely(sigmas)) {
     scale_steps_.advance(x_.t_us);
-    return;
+    return false;
   }
   flush();
   const ScaleSteps::Since step = *scale_steps_.most_likely(sigmas);
   x_ = retract(x_, step.size() * step.per_unit);
   P_ += (1.0 / step.information) * (step.per_unit * step.per_unit.transpose()).eval();
   scale_steps_.begin();
+  return true;
 }
 
 void InsCore::flush() {

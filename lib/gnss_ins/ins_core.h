@@ -83,8 +83,8 @@ class InsCore {
 
   /// From now on, what a step of the wheels' scale would have made of the errors is known, (M.50).
   void follow_scale_steps() { scale_steps_.begin(); }
-  /// Takes a step of it back that explains the innovations better than chance does at this many sigmas.
-  void mend_scale(double sigmas);
+  /// Takes a step of it back that explains the innovations better than chance does at this many sigmas; true if so.
+  bool mend_scale(double sigmas);
   [[nodiscard]] const ScaleSteps& scale_steps() const { return scale_steps_; }
 
   [[nodiscard]] const NavState& state() const { return x_; }

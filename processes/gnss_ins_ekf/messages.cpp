@@ -63,6 +63,10 @@ void fill_estimates(const InsCore& core, const GnssInsVehicle& vehicle, ins_stat
   m.gnss_position_latency_std_s = std_of(P, kPositionLatency);
   m.gnss_velocity_latency_s = x.velocity_latency;
   m.gnss_velocity_latency_std_s = std_of(P, kVelocityLatency);
+  m.imu_time_offset_s = x.imu_offset;
+  m.imu_time_offset_std_s = std_of(P, kImuOffset);
+  m.wheel_latency_s = x.wheel_latency;
+  m.wheel_latency_std_s = std_of(P, kWheelLatency);
 }
 
 int8_t pose_state(const GnssInsOutput& output) {
@@ -123,6 +127,7 @@ ins_status_t ins_status(const GnssInsStatus& status, const InsCore* core, const 
   m.gnss_quality = static_cast<int8_t>(status.gnss_quality);
   m.gnss_reason = status.gnss_reason;
   m.wheel_scale = 1.0;
+  m.wheel_scale_steps = status.wheel_scale_steps;
   if (core != nullptr) fill_estimates(*core, vehicle, m);
   return m;
 }

@@ -4,6 +4,7 @@
 
 #include "filter_run.h"
 #include "gnss_ins_ekf/handler.h"
+#include "gnss_ins_ekf/messages.h"
 
 using namespace roadfix;
 
@@ -95,4 +96,22 @@ TEST_CASE("wheel speeds 50 ms old are found to be so where the calibration is si
   std::printf("wheel speeds 50 ms old: within three sigma %.3f, told that they are not: %.3f\n", found, denied);
   CHECK(found > 0.99);
   CHECK(denied < 0.9);
+}
+
+TEST_CASE("INS_STATUS tells how old wheel speeds are, and how far the IMU's clock is off") {
+  ScenarioConfig s = short_city_loop();
+  s.wheels.link.clock_offset_s = 0.05;
+  s.imu.link.clock_offset_s = -0.03;
+  const SimulatedDrive drive = simulate(s, 1);
+  GnssInsConfig config = test::filter_config(s);
+  config.vehicle.time_offset_std = config.vehicle.wheel_latency_std = 0.05;
+  GnssIns filter(config);
+  test::run(filter, test::Samples(drive), [](GnssIns& f, int64_t) { f.clear_records(); });
+  const ins_status_t told = ins_status(filter.status(), filter.core(), config.vehicle);
+  CHECK(told.wheel_latency_std_s < 0.01);
+  CHECK(std::abs(told.wheel_latency_s - 0.05) < 3.0 * told.wheel_latency_std_s);
+  CHECK(told.imu_time_offset_std_s < 0.02);
+  CHECK(std::abs(told.imu_time_offset_s + 0.03) < 3.0 * told.imu_time_offset_std_s);
+  CHECK(std::abs(told.imu_time_offset_s) > 3.0 * told.imu_time_offset_std_s);  // teeth: nought would not do
+  CHECK(told.wheel_scale_steps == 0);
 }

@@ -81,11 +81,13 @@ namespace {
 struct Told {
   double honest = 0.0;  ///< error squared over variance, level
   double error = 0.0;   ///< m, root mean square
+  int64_t steps = 0;    ///< that were taken back
 };
 
 /// The last seconds of a minute of tunnel, over some drives, with wheels that a fault changes.
 Told in_tunnel(const char* fault, bool steps) {
   test::LevelScore score;
+  int64_t taken_back = 0;
   for (uint64_t seed = 1; seed <= 6; ++seed) {
     ScenarioConfig s = scenario("tunnel_dark");
     s.duration_s = 151.0;
@@ -95,8 +97,9 @@ Told in_tunnel(const char* fault, bool steps) {
     config.aiding.use_scale_steps = steps;
     GnssIns filter(config);
     score.run(filter, drive, 140.0, 150.0);
+    taken_back += filter.status().wheel_scale_steps;
   }
-  return {score.squares / score.variances, std::sqrt(score.squares / score.scored)};
+  return {score.squares / score.variances, std::sqrt(score.squares / score.scored), taken_back};
 }
 
 }  // namespace
@@ -110,6 +113,7 @@ TEST_CASE("wheels whose scale steps before a tunnel or in it are found out witho
                 told.error, told.honest, believed.error, believed.honest, none.error, none.honest);
     CHECK(told.honest < 1.5);
     CHECK(told.error < 1.25 * none.error);
+    CHECK(told.steps >= 6);        // one in each drive
     CHECK(believed.honest > 2.5);  // teeth
   }
 }
@@ -117,6 +121,7 @@ TEST_CASE("wheels whose scale steps before a tunnel or in it are found out witho
 TEST_CASE("where no scale steps the wheels are not doubted, also not noisier ones") {
   const Told none = in_tunnel(nullptr, true), unasked = in_tunnel(nullptr, false);
   CHECK(none.error == Approx(unasked.error).epsilon(0.02));
+  CHECK(none.steps == 0);
   const Told noisy = in_tunnel("wheels.noise@60+200:factor=2", true);
   CHECK(noisy.honest < 1.25);
 }
