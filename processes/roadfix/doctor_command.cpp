@@ -49,7 +49,9 @@ void add_doctor_command(CLI::App& app) {
                                          "and devices; print what mends each");
   command->add_option("--url", options->url, "the bus")->capture_default_str();
   command->add_option("--logs", options->log_folder, "where recordings go")->capture_default_str();
-  command->add_option("--space-gib", options->wanted_gib, "space that a drive wants")->capture_default_str();
+  command->add_option("--space-gib", options->wanted_gib, "space that a drive wants")
+      ->check(CLI::Range(0.0, 1e9))
+      ->capture_default_str();
   command->add_flag("!--no-loopback", options->loopback, "send nothing, not even to ourselves");
   command->callback([options] { run(*options); });
 }

@@ -1,5 +1,6 @@
 // The one command line tool. Each subcommand lives in a file of its own and adds itself here.
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <csignal>
 #include <exception>
 #include <iostream>
@@ -11,6 +12,29 @@ namespace {
 
 /// Wrong usage, a bad file or a bad value: the message names it, the shell sees 2 (STYLE.md, section 5).
 constexpr int kUserError = 2;
+
+/// No option means NaN, and comparisons let it through every range.
+void refuse_nan(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_type_name() != "FLOAT" && !option->get_type_name().starts_with("FLOAT:")) continue;
+    option->check([](const std::string& text) {
+      double value = 0.0;
+      return CLI::detail::lexical_cast(text, value) && std::isnan(value) ? text + " is no number" : std::string();
+    });
+  }
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) refuse_nan(*command);
+}
+
+/// What was meant for a subcommand, and is none.
+void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  std::string known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == argv[1]) return;
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  throw std::runtime_error(std::string("there is no subcommand '") + argv[1] + "' (there are " + known + ")");
+}
 
 }  // namespace
 
@@ -29,7 +53,9 @@ int main(int argc, char** argv) {
   roadfix::add_run_command(app);
   roadfix::add_simulate_command(app);
   roadfix::add_verify_command(app);
+  refuse_nan(app);
   try {
+    refuse_unknown_command(app, argc, argv);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     // CLI11's own codes are above 100; a subcommand that has said what failed ends with its small one.

@@ -79,8 +79,9 @@ void add_replay_command(CLI::App& app) {
   command->add_option("--stages", arguments->stages, "Stages, separated by commas")->required()->delimiter(',');
   command->add_option("--config", arguments->config, "The vehicle's configuration folder")->required();
   command->add_option("--out", arguments->out, "Log to write: the stages' outputs and the drive's facts")->required();
-  command->add_option("--from-s", arguments->from_s,
-                      "Begin each stage at its last snapshot in the first so many seconds");
+  command
+      ->add_option("--from-s", arguments->from_s, "Begin each stage at its last snapshot in the first so many seconds")
+      ->check(CLI::Range(0.0, 1e9));
   command->add_flag("--timing", arguments->timing, "Print how long each handler takes");
   command->add_flag("--progress", arguments->progress, "Print progress also where stderr is no terminal");
   command->callback([arguments] { run_replay(*arguments); });

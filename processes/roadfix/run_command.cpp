@@ -8,6 +8,7 @@
 #include "bus/run/service.h"
 #include "config/config.h"
 #include "roadfix/commands.h"
+#include "roadfix/doctor/doctor.h"
 #include "roadfix/supervise/supervisor.h"
 
 namespace roadfix {
@@ -25,6 +26,7 @@ struct Options {
 void run(const Options& options) {
   RunConfig config = load_config<RunConfig>(options.vehicle / "run.yaml");
   if (!options.bus.empty()) config.bus = options.bus;
+  static_cast<void>(parse_bus_url(config.bus));  // here once, not from each process again and again
   for (SupervisedProcess& process : config.processes) {
     if (!process.plain && process.realtime_priority == 0) process.realtime_priority = options.realtime;
   }
