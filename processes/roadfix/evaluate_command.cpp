@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -42,7 +43,10 @@ EvaluationOptions evaluation_options(const Options& options) {
 
 /// The channels asked for, each of which must be there; all estimates where none was named.
 std::vector<std::string> chosen_channels(const Options& options, const EvaluationLog& log) {
-  std::vector<std::string> chosen = options.channels;
+  std::vector<std::string> chosen;
+  for (const std::string& channel : options.channels) {
+    if (std::find(chosen.begin(), chosen.end(), channel) == chosen.end()) chosen.push_back(channel);
+  }
   if (chosen.empty()) {
     for (const auto& [channel, stream] : log.poses) {
       if (channel != "REFERENCE") chosen.push_back(channel);
@@ -133,6 +137,7 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--tie-us", options->tie_us, "when tied; before the first outage where not given");
   command->add_flag("--fit-latency", options->fit_delay, "fit the reference's constant latency first, within 2 s");
   command->add_option("--turn-degps", options->turn_degps, "yaw rate that counts as a turn (MPA)")
+      ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   command->add_option("--out", options->out, "folder for the report; LOG-report where not given");
   command->add_option("--json", options->json, "a copy of the figures");

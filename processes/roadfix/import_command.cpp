@@ -51,6 +51,11 @@ void run(Options& options) {
     options.read.format = detect_format(options.source);
     std::cout << options.source.string() << ": format " << options.read.format << "\n";
   }
+  const bool of_poses = !options.read.sequence.empty() || options.read.times || options.read.reference;
+  if (of_poses && options.read.format != "poses") {
+    throw std::runtime_error("--sequence, --times and --reference are for poses; this source is of format " +
+                             options.read.format);
+  }
   Drive drive = read_source(options.source, options.read);
   const std::string name = drive.description.name;
   if (!options.vehicle.empty()) {
@@ -61,6 +66,10 @@ void run(Options& options) {
   const DriveLogSummary summary =
       write_drive_log(std::move(drive), options.changes, options.out, shows ? Progress(print_progress) : Progress());
   std::cout << options.out.string() << ": " << name << "\n" << summary.text;
+  if (options.changes.gnss.cut && summary.facts.outages.empty()) {
+    std::cout << fmt::format("  GNSS not cut: no window of {} s ends {} s before the last fix\n",
+                             options.changes.gnss.cut->length, kWindowMargin);
+  }
   for (const Outage& outage : summary.facts.outages) {
     std::cout << fmt::format("  GNSS cut from {} to {}, {:.2f} s after the first fix\n", outage.first_withheld_us,
                              outage.last_withheld_us,

@@ -82,6 +82,9 @@ void copy_log(const LogArguments& arguments, const Wanted& wanted) {
     if (wanted(*event)) writer.write(event->channel, event->timestamp_us, event->data);
   }
   const int64_t written = writer.events();
+  if (written == 0)
+    throw std::runtime_error(arguments.out + ": not written: none of the " + std::to_string(events) +
+                             " events is wanted");
   writer.commit();
   print_damage(arguments, reader.damage());
   std::cout << fmt::format("{}: {} of {} events\n", arguments.out, written, events);

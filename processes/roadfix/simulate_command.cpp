@@ -85,7 +85,14 @@ ScenarioConfig configured(const Options& options) {
   ScenarioConfig config = load_scenario(options.scenario);
   if (options.duration_s > 0.0) config.duration_s = options.duration_s;
   set_camera(options, config.camera);
-  for (const std::string& text : options.faults) config.faults.push_back(parse_fault(text));
+  for (const std::string& text : options.faults) {
+    config.faults.push_back(parse_fault(text));
+    const Fault& fault = config.faults.back();
+    const bool blind = fault.sensor == Sensor::kCamera && config.camera.layout == CameraLayout::kNone;
+    if (fault.start_s < config.duration_s && !blind) continue;
+    std::cerr << fmt::format("simulate: fault {} never acts: {}\n", text,
+                             blind ? "there is no camera" : fmt::format("the drive ends at {} s", config.duration_s));
+  }
   return config;
 }
 

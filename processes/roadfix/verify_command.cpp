@@ -56,6 +56,7 @@ void run_verify(const VerifyArguments& arguments) {
     }
     stages.emplace_back([name, &arguments] { return std::move(make_stages({name}, arguments.config).front()); });
   }
+  if (stages.empty()) throw std::runtime_error(arguments.config + ": no stage can be made with this configuration");
   const VerifyReport report = verify({arguments.logs.begin(), arguments.logs.end()}, stages);
   print_list("damaged", report.log_damage);
   int64_t identical = 0;

@@ -25,6 +25,7 @@ void store(uint8_t* to, uint64_t value, int size) {
 }  // namespace
 
 LogWriter::LogWriter(const std::filesystem::path& path, Mode mode) : path_(path), written_path_(path), mode_(mode) {
+  if (path.empty()) throw LogError("the log to write has no name");
   if (mode == Mode::kWhole) {
     const OutputPlace place = output_place(path);
     path_ = place.path;

@@ -171,6 +171,7 @@ class LogCollector {
 
   [[nodiscard]] bool is_pose(const std::string& channel) const {
     if (channel == kReferenceChannel) return true;
+    if (channel == "CONFIG_DRIVE" || channel == "FUSION_STATE") return false;
     return channels_.empty() ? channel.starts_with("POSE_") : channels_.contains(channel);
   }
 

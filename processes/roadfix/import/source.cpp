@@ -22,6 +22,7 @@ std::string detect_format(const fs::path& source) {
   const auto has = [&](const char* name) { return fs::exists(source / name, ignored); };
   if (!fs::exists(source, ignored)) throw ConfigError(source.string(), 0, "no such file or folder");
   if (fs::is_regular_file(source, ignored)) return "poses";
+  if (!fs::is_directory(source, ignored)) throw ConfigError(source.string(), 0, "is neither a folder nor a file");
   if (has("drive.yaml")) return "folder";
   if (has("mav0") || (has("imu0") && has("cam0"))) return "euroc";
   if (has("calib.txt") && (has("image_0") || has("image_2"))) return "kitti";
