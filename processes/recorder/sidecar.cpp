@@ -43,7 +43,7 @@ void write_sidecar(const std::filesystem::path& path, const Sidecar& sidecar) {
 
   const std::filesystem::path part = path.string() + ".part";
   std::ofstream out(part);
-  out << json.dump(1) << "\n";
+  out << json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
   out.close();
   std::error_code error;
   if (out)

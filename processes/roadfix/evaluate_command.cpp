@@ -108,7 +108,7 @@ void run(const Options& options) {
   const EvaluationReport report = evaluate(options);
   std::filesystem::path folder = options.out;
   if (folder.empty()) folder = options.log.parent_path() / (options.log.stem().string() + "-report");
-  const std::string json = report_json(report).dump(2) + "\n";
+  const std::string json = report_json(report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   write_text_file(folder / "figures.json", json);
   if (!options.json.empty()) write_text_file(options.json, json);
   for (const ChannelScore& c : report.channels) write_text_file(folder / (c.channel + "_errors.csv"), errors_csv(c));

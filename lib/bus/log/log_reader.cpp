@@ -14,7 +14,7 @@ constexpr uint8_t kMagicBytes[4] = {0xED, 0xA1, 0xDA, 0x01};
 }  // namespace
 
 LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe is none, and would be waited for
   if (fd < 0) throw_log_error(path, "cannot open the log");
   struct stat status {};
   if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode)) {

@@ -100,9 +100,13 @@ bool Replayer::is_copied(const std::string& channel) const {
 
 void Replayer::pass_over_stray_stamps() {
   std::vector<std::vector<Stamp>> stamps(index_.channels.size());
+  std::vector<Stamp>
+      all;  // for what is far from everything, on a channel of few messages; nothing else contradicts here
   for (const IndexedMessage& m : index_.messages) {
     stamps[static_cast<std::size_t>(m.channel)].push_back({m.header.run, m.header.seq, m.header.utime});
+    all.push_back({0, 0, m.header.utime});
   }
+  const std::vector<StampError> far = stray_stamps(all);
   std::vector<std::vector<StampError>> errors;
   for (const std::vector<Stamp>& channel : stamps) errors.push_back(stray_stamps(channel));
   std::vector<std::size_t> next(index_.channels.size());
@@ -110,7 +114,8 @@ void Replayer::pass_over_stray_stamps() {
   for (const IndexedMessage& m : index_.messages) {
     const auto channel = static_cast<std::size_t>(m.channel);
     const StampError error = errors[channel][next[channel]++];
-    const bool stray = error == StampError::kEarly || error == StampError::kFar;
+    const bool is_far = error == StampError::kFar || far[passed_over_.size()] == StampError::kFar;
+    const bool stray = error == StampError::kEarly || is_far;
     passed_over_.push_back(stray);
     if (stray) {
       ++summary_.passed_over[index_.channels[channel]];

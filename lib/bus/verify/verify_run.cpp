@@ -104,8 +104,9 @@ int64_t RunVerifier::blind_from(const LogLoss& loss) const {
     if (output.header.utime <= loss.after_utime) continue;
     const std::string& type = spec_.outputs[static_cast<std::size_t>(output.output)].type;
     const std::optional<provenance_t> provenance = read_provenance(type, output.bytes);
-    if (!provenance) return loss.after_utime + 1;
-    if (provenance->last_seq.at(static_cast<std::size_t>(loss.input)) >= loss.first_seq) return output.header.utime;
+    const auto input = static_cast<std::size_t>(loss.input);
+    if (!provenance || input >= provenance->last_seq.size()) return loss.after_utime + 1;
+    if (provenance->last_seq[input] >= loss.first_seq) return output.header.utime;
   }
   return kEver;
 }

@@ -53,7 +53,7 @@ std::string History::json() const {
       lists["sig"].push_back(number(column[i].sigma, 3));
     }
   }
-  return json.dump();
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace roadfix

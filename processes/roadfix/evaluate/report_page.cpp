@@ -173,8 +173,10 @@ std::string report_page(const EvaluationReport& report) {
   replace_all(page, "@CSS@", kPageCss);
   replace_all(page, "@TABLE@", html_safe(report_table(report)));
   replace_all(page, "@JS@", kPageJs);
-  replace_all(page, "@PLOTS@", script_safe(plots_json(report).dump()));
-  replace_all(page, "@FIGURES@", script_safe(report_json(report).dump()));
+  replace_all(page, "@PLOTS@",
+              script_safe(plots_json(report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)));
+  replace_all(page, "@FIGURES@",
+              script_safe(report_json(report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)));
   return page;
 }
 

@@ -114,6 +114,7 @@ TEST_CASE("a log written to a device or a pipe goes there and leaves the device 
 
   write_log(folder / "a.lcm");
   REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
+  REQUIRE_THROWS_WITH(LogReader(folder / "pipe"), Catch::Contains("not a regular file"));  // and waits for nobody
   std::string through;
   std::thread reader([&] { through = read_bytes(folder / "pipe"); });
   write_log(folder / "pipe");

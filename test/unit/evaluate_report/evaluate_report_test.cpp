@@ -240,6 +240,20 @@ TEST_CASE("the order of the events in a log changes no figure, and a stray stamp
   CHECK(stray["notes"].size() == 1);
 }
 
+TEST_CASE("a name that is no text is shown as far as it is one") {
+  const Folder folder("text");
+  SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    writer.commit();
+  }
+  EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  report.facts.name = "drive \xB8";
+  report.notes = {"note \xFF"};
+  CHECK_THAT(report_page(report), Catch::Contains("drive "));
+}
+
 TEST_CASE("modes and weights come from the fusion's state by name") {
   const Folder folder("fusion");
   fusion_state_t state{};

@@ -174,6 +174,15 @@ TEST_CASE("a disk that takes no more ends the recording with a reason, not the p
   CHECK_FALSE(recording.reason().empty());
 }
 
+TEST_CASE("a channel's name that is no text ends no recording") {
+  const Folder folder;
+  Recording recording(folder.config(), "a");
+  recording.write("\xB8\xFF", 1, {kData.data(), 10});
+  recording.note_dropped({{"\xB8", 3}});
+  CHECK_NOTHROW(recording.close());
+  CHECK(sidecar(folder.path() / "a.json")["files"][0]["events"].size() == 1);
+}
+
 TEST_CASE("a recording never takes the place of another that began at the same second") {
   const Folder folder;
   for (const char* name : {"a", "a-2", "a-3"}) {
