@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "bus/log/log_survey.h"
+
 namespace roadfix {
 
 namespace {
@@ -34,6 +36,7 @@ MergedLogs::MergedLogs(const std::vector<std::filesystem::path>& paths) {
   for (const std::filesystem::path& path : paths) {
     File file;
     file.reader = std::make_unique<LogReader>(path);
+    require_our_log(*file.reader);
     file.shift_us = shift_of(*file.reader);
     file.head = file.reader->next();
     files_.push_back(std::move(file));

@@ -18,7 +18,7 @@ namespace roadfix {
 
 class MergedLogs {
  public:
-  /// Throws LogError.
+  /// Throws LogError, also for a file that is no log of ours.
   explicit MergedLogs(const std::vector<std::filesystem::path>& paths);
 
   struct Event {

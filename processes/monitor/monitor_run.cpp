@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "bus/log/log_writer.h"
+#include "bus/log/output_place.h"
 #include "bus/run/run_clock.h"
 #include "bus/run/run_process.h"
 #include "bus/run/service.h"
@@ -78,6 +79,9 @@ class LogSink : public Bus {
 };
 
 void run_logs(const MonitorOptions& options, const MonitorConfig& config) {
+  for (const std::filesystem::path& log : options.logs) {
+    if (!options.log_out.empty()) refuse_to_replace(log, options.log_out);
+  }
   MergedLogs logs(options.logs);
   // A log tells what its car had; which processes should have run, its HEARTBEAT channels tell.
   Expectations expectations = expectations_of(config, options.vehicle);

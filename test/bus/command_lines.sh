@@ -34,4 +34,14 @@ for program in $stages $drivers; do
   "$bin/$program" --config "$folder" --log-in some.lcm >"$folder/out" 2>"$folder/errors"; status=$?
   [[ $status == 2 ]] && grep -q -- "--log-in requires --log-out" "$folder/errors" || fail "$program --log-in alone: status $status, $(cat "$folder/errors")"
 done
+# Over logs: no output over the input, and none from a log with nothing to make it of.
+"$bin/roadfix" simulate standing --no-camera --duration 3 --out "$folder/drive.lcm" >/dev/null
+rm -f "$folder"/*.yaml
+for driver in gnss_driver imu_driver; do
+  printf 'device: /dev/null\n' >"$folder/$driver.yaml"
+  "$bin/$driver" --config "$folder" --log-in "$folder/drive.lcm" --log-out "$folder/made.lcm" >"$folder/out" 2>"$folder/errors"; status=$?
+  [[ $status == 2 && ! -e $folder/made.lcm ]] && grep -q "no message on RAW_" "$folder/errors" || fail "$driver without raw bytes: status $status, $(cat "$folder/out" "$folder/errors")"
+done
+"$bin/monitor" --plain --no-dashboard --log-in "$folder/drive.lcm" --log-out "$folder/drive.lcm" >"$folder/out" 2>"$folder/errors"; status=$?
+[[ $status == 2 ]] && grep -q 'would replace the input' "$folder/errors" || fail "monitor over its own log: status $status, $(cat "$folder/errors")"
 exit $bad

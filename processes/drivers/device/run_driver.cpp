@@ -95,6 +95,11 @@ DriverReplay replay_driver(const std::filesystem::path& in, const std::filesyste
     const std::span<const uint8_t> bytes(raw.data.data(), raw.data.size());
     raw_reader.take(static_cast<int>(channel - setup.raw_channels.begin()), header, bytes);
   }
+  if (result.raw == 0) {
+    std::string channels;
+    for (const std::string& channel : setup.raw_channels) channels += (channels.empty() ? "" : ", ") + channel;
+    throw LogError(in.string() + ": no message on " + channels + ", from which this driver's could be made again");
+  }
   result.lost = raw_reader.lost();
   result.messages = writer.events();
   writer.commit();

@@ -1,5 +1,6 @@
 // The monitor over logs: the same verdicts each time, those that the demo drive deserves.
 #include <catch2/catch.hpp>
+#include <fstream>
 #include <roadfix/imu_t.hpp>
 
 #include "bus/log/log_writer.h"
@@ -112,4 +113,12 @@ TEST_CASE("logs are merged by time; one recorded while it was played is put back
   while (twice.next()) ++once;
   CHECK(once == 10);
   CHECK(logs.share_done() == 1.0);
+}
+
+TEST_CASE("what is no log is no drive that was silent") {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder / "empty.lcm").close();
+  std::ofstream(folder / "text.lcm") << "not a log";
+  CHECK_THROWS_WITH(MergedLogs({estimates(), folder / "empty.lcm"}), Catch::Contains("empty.lcm: is empty"));
+  CHECK_THROWS_WITH(MergedLogs({folder / "text.lcm"}), Catch::Contains("is no LCM log"));
 }
