@@ -48,7 +48,7 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
     ++track.counters.duplicate;
     return Offer::kDuplicate;
   }
-  track.newest_utime = std::max(track.newest_utime, id.utime);
+  note_newest(track, id.utime);
   if (verdict == ClockChoice::Verdict::kTick) {
     tick(input, id, last_utime);
     return Offer::kTick;
@@ -68,10 +68,16 @@ Offer InputStream::skip(int input, const EventId& id) {
     return Offer::kDuplicate;
   }
   ++track.counters.skipped;
-  track.newest_utime = std::max(track.newest_utime, id.utime);
+  note_newest(track, id.utime);
   ledger_.note(LedgerKind::kSkipped, input, id.run, id.seq, id.seq, id.utime);
   limit_waiting();
   return Offer::kSkipped;
+}
+
+/// One stamp ages ahead would make the channel look young for ever.
+void InputStream::note_newest(InputTrack& track, int64_t utime) const {
+  if (clock_.utime() && utime - *clock_.utime() > ClockChoice::kLeap_us) return;
+  track.newest_utime = std::max(track.newest_utime, utime);
 }
 
 /// What happens to a message that comes twice, too late, or from a publisher that another has replaced.

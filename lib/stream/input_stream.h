@@ -103,6 +103,7 @@ class InputStream {
   [[nodiscard]] Standing standing(int input, const EventId& id) const;
   [[nodiscard]] bool resumed_tick(int input, const EventId& id) const;
   std::optional<Offer> turn_away(int input, const EventId& id);
+  void note_newest(InputTrack& track, int64_t utime) const;
   Offer refuse(int input, const EventId& id, LedgerKind kind);
   void tick(int input, const EventId& id, std::optional<int64_t> last_utime);
   void settle_tick(int input, const EventId& id);

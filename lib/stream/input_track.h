@@ -38,7 +38,7 @@ class InputTrack {
   std::optional<Applied> applied;
   std::optional<Settled> settled;
   int64_t newest_settled_utime = 0;
-  int64_t newest_utime = 0;  ///< of the messages that were in time; 0 before the first
+  int64_t newest_utime = 0;  ///< of the messages that were in time, and not far ahead of it; 0 before the first
   InputCounters counters;
 
   void begin_run(int64_t run, int64_t first_seq) {

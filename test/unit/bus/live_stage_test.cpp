@@ -91,6 +91,25 @@ TEST_CASE("a message with impossible numbers is undecodable") {
   REQUIRE(ear.heard["POSE_INS"].size() == 200);
 }
 
+TEST_CASE("one stamp that is years ahead does not keep a silent input young") {
+  MemoryBus bus;
+  Ear ear(bus);
+  LiveStage live(make_filter, bus);
+  for (DriveMessage message : small_drive(8.0)) {
+    if (message.channel == "GNSS" && message.header.utime >= kDriveStart_us + 3'000'000) continue;
+    if (message.channel == "GNSS" && message.header.seq == 4) {
+      message = drive_message("GNSS", message.header.utime + 31'557'600'000'000, 4, decode<gnss_t>(message.bytes));
+    }
+    bus.publish(message.channel, message.bytes);
+    live.step(std::chrono::milliseconds(0));
+  }
+  live.stop();
+  bus.handle(std::chrono::milliseconds(0));
+  const heartbeat_t last = decode<heartbeat_t>(ear.heard["HEARTBEAT_FILTER"].back());
+  CHECK(last.input_age_s[1] == Approx(5.24).margin(0.02));  // of the fix at 2.75 s, at 7.99 s
+  CHECK(last.input_applied[1] == 11);                       // of twelve
+}
+
 TEST_CASE("two publishers on a channel are said") {
   MemoryBus bus;
   Ear ear(bus);
