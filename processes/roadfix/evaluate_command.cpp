@@ -108,12 +108,15 @@ void run(const Options& options) {
   const EvaluationReport report = evaluate(options);
   std::filesystem::path folder = options.out;
   if (folder.empty()) folder = options.log.parent_path() / (options.log.stem().string() + "-report");
+  const std::filesystem::path page = folder / "report.html";
+  if (options.json.lexically_normal() == page.lexically_normal())
+    throw EvaluationLogError(options.json.string() + ": --json is where the page goes");
   const std::string json = report_json(report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   write_text_file(folder / "figures.json", json);
   if (!options.json.empty()) write_text_file(options.json, json);
   for (const ChannelScore& c : report.channels) write_text_file(folder / (c.channel + "_errors.csv"), errors_csv(c));
-  write_text_file(folder / "report.html", report_page(report));
-  std::cout << report_table(report) << (folder / "report.html").string() << "\n";
+  write_text_file(page, report_page(report));
+  std::cout << report_table(report) << page.string() << "\n";
 }
 
 }  // namespace

@@ -40,6 +40,11 @@ said 2 'no poses on channel CONFIG_DRIVE' export out.lcm --channel CONFIG_DRIVE 
 said 2 'no poses on channel GNSS' export drive.lcm --channel GNSS --out x.tum
 said 2 'no stage can be made with this configuration' verify drive.lcm --config empty
 said 2 'only udpm:// goes over a network' run "$config" --bus nonsense
+mkdir vehicle; echo 'processes: []' >vehicle/run.yaml
+said 2 'vehicle/run.yaml:1: processes' run vehicle
+echo 'processes: [{name: monitor}, {name: monitor}]' >vehicle/run.yaml
+said 2 'must not have two of one name' run vehicle
+said 2 'is where the page goes' evaluate out.lcm --out report --json ./report/report.html
 said 2 'neither a folder nor a file' import /dev/null --out x.lcm
 [[ ! -e x.lcm && ! -e x.tum ]] || fail 'something was written'
 

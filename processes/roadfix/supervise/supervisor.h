@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -50,11 +51,19 @@ void visit(SupervisedProcess& c, Visitor& v) {
           "is for our own programs; for others: program: chrt, arguments: [-f, \"50\", NAME]");
 }
 
+inline bool have_names_of_their_own(const std::vector<SupervisedProcess>& processes) {
+  std::set<std::string> names;
+  for (const SupervisedProcess& process : processes) names.insert(process.name);
+  return names.size() == processes.size();
+}
+
 template <class Visitor>
 void visit(RunConfig& c, Visitor& v) {
   v.text("bus_url", c.bus);
   v.require("processes");
   v.groups("processes", c.processes);
+  v.check("processes", !c.processes.empty(), "must name a process");
+  v.check("processes", have_names_of_their_own(c.processes), "must not have two of one name: give one of them another");
   v.number("start_gap_s", c.start_gap, 0.0, 60.0);
   v.number("backoff_first_s", c.backoff_first, 0.01, 60.0);
   v.number("backoff_max_s", c.backoff_max, 0.01, 3600.0);
