@@ -93,6 +93,7 @@ void Msckf::take(const ImuSample& imu) {
   const double dt = imu_.empty() ? 0.0 : seconds_between(imu_.back().t_us, imu.t_us);
   if (dt > kMaxGap_s) {
     planned_.reset();
+    past_.clear();
     if (phase_ == MsckfPhase::kRunning) lose("gap in the imu samples");
   }
   if (dt > 0.0 && dt <= kMaxGap_s) standing_.add(imu, dt);
@@ -203,7 +204,7 @@ bool Msckf::use(const SeenFrame& frame) {
   if (phase_ != MsckfPhase::kRunning && !start_standing(t_us)) {
     if (plan_moving(t_us)) return false;
     watch(frame);
-    return true;
+    return !start_in_past(frame);
   }
   if (t_us < state_.imu.t_us) return true;
   propagate(t_us);

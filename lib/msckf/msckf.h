@@ -144,7 +144,13 @@ class Msckf {
   /// Decides on a start in motion here; it begins some seconds later, when they can be gone through.
   bool plan_moving(int64_t t_us);
   bool start_planned(int64_t until_us);
+  /// m/s, standard deviation along the way.
+  [[nodiscard]] double speed_std() const;
   [[nodiscard]] bool speed_known() const;
+  /// Where nothing tells a speed: from the last seconds' pictures, whenever they are there and told it, (M.50).
+  bool start_in_past(const msckf::SeenFrame& now);
+  [[nodiscard]] std::optional<msckf::MovingStart> plan_in_past(int64_t begin_us, int64_t end_us) const;
+  bool try_past(const msckf::MovingStart& plan);
   /// Begins at `at` and uses what waits up to `end_us`; with `fixed`, linearised along the course that `at` gives.
   void go_through(const msckf::MovingStart& plan, const msckf::Beginning& at, int64_t end_us, bool fixed);
   void begin_moving(const msckf::MovingStart& plan, const msckf::Beginning& at);
@@ -185,6 +191,8 @@ class Msckf {
   std::deque<WheelSample> wheels_;
   std::optional<msckf::KnownSpeed> known_speed_, wheel_speed_;
   std::optional<msckf::MovingStart> planned_;
+  std::deque<msckf::SeenFrame> past_;  ///< before a start, the last seconds' pictures
+  int64_t next_past_us_ = 0;
   msckf::SeenFrame watched_;  ///< before a start, newest picture that watch() took
   std::optional<msckf::KnownVelocity> by_eyes_;
 

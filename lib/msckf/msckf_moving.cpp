@@ -144,12 +144,14 @@ bool Msckf::start_planned(int64_t until_us) {
   return true;
 }
 
+double Msckf::speed_std() const {
+  // In v = Exp(phi) v^ + nu phi does not change the speed.
+  const Eigen::Vector3d along = state_.imu.v.normalized();
+  return std::sqrt(along.dot(state_.P().block<3, 3>(kVel, kVel) * along));
+}
+
 bool Msckf::speed_known() const {
-  if (phase_ != MsckfPhase::kRunning) return false;
-  const Eigen::Vector3d& v = state_.imu.v;
-  // Along the way; in v = Exp(phi) v^ + nu phi does not change the speed.
-  const double variance = v.normalized().dot(state_.P().block<3, 3>(kVel, kVel) * v.normalized());
-  return std::sqrt(variance) < std::max(kSlowKnown, kSpeedKnown * v.norm());
+  return phase_ == MsckfPhase::kRunning && speed_std() < std::max(kSlowKnown, kSpeedKnown * state_.imu.v.norm());
 }
 
 void Msckf::go_through(const MovingStart& plan, const Beginning& at, int64_t end_us, bool fixed) {

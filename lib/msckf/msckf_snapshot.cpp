@@ -110,7 +110,8 @@ void Msckf::serialise(Archive& a) {
   standing_.serialise(a);
   clock_.serialise(a);
   list(a, imu_, kMost, [&](ImuSample& s) { imu_sample(a, s); });
-  list(a, frames_, kMost, [&](SeenFrame& f) { frame(a, f); });
+  for (std::deque<SeenFrame>* frames : {&frames_, &past_}) list(a, *frames, kMost, [&](SeenFrame& f) { frame(a, f); });
+  a(next_past_us_);
   list(a, wheels_, kMost, [&](WheelSample& w) {
     a(w.t_us, w.direction, w.num_speeds);
     for (double& speed : w.speeds) a(speed);

@@ -98,6 +98,7 @@ void Msckf::begin_at(int64_t t_us, const Eigen::Vector3d& up_in_imu, const Eigen
   propagation_.clear();
   planned_.reset();
   watched_ = {};
+  past_.clear();
   by_eyes_.reset();
   phase_ = MsckfPhase::kRunning;
   reason_.clear();

@@ -102,7 +102,7 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
-  spec_.state_layout = 8;
+  spec_.state_layout = 9;
 }
 
 void MsckfStage::make_parts() {
