@@ -16,10 +16,12 @@ constexpr int64_t kPictureUs = 150'000;  // by which the oldest picture may be y
 constexpr int64_t kLevelUs = 250'000;    // on both sides of the beginning: the specific force is taken for gravity
 // m/s: a guess that is too low approaches the truth from below, one too high overshoots to the other side of zero.
 constexpr double kGuess = 6.0, kGuessStd = 15.0;
-constexpr double kLeastSpeed = 1.0;      // m/s, at the beginning
-constexpr double kStartAccel = 1.5;      // m/s2 along the way that levelling takes for a slope, (M.39)
-constexpr double kKnownShare = 0.03;     // of the speed, its standard deviation at the end
-constexpr double kHopeless = 0.5;        // likewise: nothing has told it
+constexpr double kLeastSpeed = 1.0;  // m/s, at the beginning
+constexpr double kStartAccel = 1.5;  // m/s2 along the way that levelling takes for a slope, (M.39)
+// Standard deviation of the speed at the end, at most. Just told, a speed that was found too low claims to be known too
+// well: both, or a highway claims too much (E12).
+constexpr double kKnownShare = 0.05, kKnownStd = 0.6;  // of the speed; m/s
+constexpr double kHopeless = 0.5;                      // likewise: nothing has told it
 constexpr double kSettled = 0.3;         // of its standard deviation, by which the last pass may have moved the speed
 constexpr double kLeastFitting = 0.5;    // of the points
 constexpr int kSurePass = 3, kMost = 8;  // passes before the speed may have settled, and most
@@ -76,7 +78,7 @@ bool Msckf::try_past(const MovingStart& plan) {
     const double begun = better->v.dot(plan.at.v) / kGuess, share = trial.speed_std() / trial.state_.imu.v.norm();
     if (begun < kLeastSpeed || (pass > kSurePass && share > kHopeless)) return false;
     if (pass >= kSurePass && std::abs(begun - before) < kSettled * trial.speed_std()) {
-      if (share > kKnownShare || trial.used_share_ < kLeastFitting) return false;
+      if (share > kKnownShare || trial.speed_std() > kKnownStd || trial.used_share_ < kLeastFitting) return false;
       trial.frames_ = frames_;
       trial.wheels_ = wheels_;
       trial.next_past_us_ = next_past_us_;
