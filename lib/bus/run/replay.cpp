@@ -100,8 +100,7 @@ bool Replayer::is_copied(const std::string& channel) const {
 
 void Replayer::pass_over_stray_stamps() {
   std::vector<std::vector<Stamp>> stamps(index_.channels.size());
-  std::vector<Stamp>
-      all;  // for what is far from everything, on a channel of few messages; nothing else contradicts here
+  std::vector<Stamp> all;  // as one channel: what is far from everything, though on its own channel nothing contradicts
   for (const IndexedMessage& m : index_.messages) {
     stamps[static_cast<std::size_t>(m.channel)].push_back({m.header.run, m.header.seq, m.header.utime});
     all.push_back({0, 0, m.header.utime});
