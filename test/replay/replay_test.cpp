@@ -196,7 +196,7 @@ TEST_CASE("where a log has no clock, its first damage is named, and it alone") {
     LogReader reader(folder / "in.lcm");
     while (const auto event = reader.next()) offsets.push_back(event->offset);
   }
-  for (const std::size_t i : {10, 20, 30}) bytes[offsets[i]] = 'x';
+  for (const std::size_t i : {10U, 20U, 30U}) bytes[offsets[i]] = 'x';
   std::ofstream(folder / "in.lcm", std::ios::binary) << bytes;
   const std::string first = "damaged at byte " + std::to_string(offsets[10]) + " ";
   const std::string second = std::to_string(offsets[20]);

@@ -19,7 +19,7 @@ const std::vector<StageSpec>& all_specs() {
 std::vector<NewStage> all_stages(double factor = 0.99) {
   std::vector<NewStage> stages;
   for (const StageSpec& spec : all_specs()) {
-    stages.push_back([&spec, factor] { return std::make_unique<ChainStage>(spec, factor); });
+    stages.emplace_back([&spec, factor] { return std::make_unique<ChainStage>(spec, factor); });
   }
   return stages;
 }
