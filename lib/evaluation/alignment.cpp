@@ -100,7 +100,7 @@ Similarity turned_onto(const PosePair& pair, double yaw) {
 }  // namespace
 
 Similarity tie(const PosePair& pair) {
-  return turned_onto(pair, yaw_of(pair.reference.T_frame_vehicle.q) - yaw_of(pair.estimate.T_frame_vehicle.q));
+  return turned_onto(pair, yaw_between(pair.estimate.T_frame_vehicle.q, pair.reference.T_frame_vehicle.q));
 }
 
 Similarity tie_by_way(const PosePair& from, const PosePair& to) {

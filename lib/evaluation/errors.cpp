@@ -1,9 +1,32 @@
 #include "evaluation/errors.h"
 
+#include <cmath>
+
 #include "geometry/euler.h"
+#include "geometry/frames.h"
 #include "geometry/so3.h"
 
 namespace roadfix {
+
+namespace {
+
+constexpr double kSteepest = 60.0 * kDegree;  // of a road vehicle's pitch, by far
+
+bool is_steep(const Eigen::Quaterniond& q) { return std::abs(yaw_pitch_roll(q).pitch) > kSteepest; }
+
+/// PoseError::angles.
+Eigen::Vector3d angles_between(const Eigen::Quaterniond& reference, const Eigen::Quaterniond& estimate) {
+  if (is_steep(reference)) return log_q(estimate * reference.conjugate());
+  const YawPitchRoll a = yaw_pitch_roll(estimate);
+  const YawPitchRoll b = yaw_pitch_roll(reference);
+  return {wrap_angle(a.roll - b.roll), wrap_angle(a.pitch - b.pitch), wrap_angle(a.yaw - b.yaw)};
+}
+
+}  // namespace
+
+Eigen::Matrix3d R_angles_vehicle(const Eigen::Quaterniond& reference) {
+  return is_steep(reference) ? reference.toRotationMatrix() : Eigen::Matrix3d::Identity();
+}
 
 PoseError pose_error(const PosePair& pair, const ReferenceKind& kind) {
   const SE3& estimate = pair.estimate.T_frame_vehicle;
@@ -15,9 +38,7 @@ PoseError pose_error(const PosePair& pair, const ReferenceKind& kind) {
   const Eigen::Quaterniond q_frame_vehicle = kind.attitude ? reference.q : estimate.q;
   e.position_vehicle = q_frame_vehicle.conjugate() * e.position_frame;
   if (kind.attitude) {
-    const YawPitchRoll a = yaw_pitch_roll(estimate.q);
-    const YawPitchRoll b = yaw_pitch_roll(reference.q);
-    e.angles = {wrap_angle(a.roll - b.roll), wrap_angle(a.pitch - b.pitch), wrap_angle(a.yaw - b.yaw)};
+    e.angles = angles_between(reference.q, estimate.q);
     e.rotation = log_q(reference.q.conjugate() * estimate.q);
   }
   if (kind.velocity) {

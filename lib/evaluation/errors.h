@@ -14,9 +14,11 @@ struct PoseError {
   int64_t t_us = 0;
   Eigen::Vector3d position_frame = Eigen::Vector3d::Zero();    ///< m, axes of the common frame (east, north, up)
   Eigen::Vector3d position_vehicle = Eigen::Vector3d::Zero();  ///< m: longitudinal, lateral (left), vertical (up)
-  Eigen::Vector3d angles = Eigen::Vector3d::Zero();            ///< rad: roll, pitch, yaw, each wrapped
-  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();          ///< rad, log(q_reference^-1 q_estimate), vehicle axes
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s, vehicle axes (frame axes without attitude)
+  /// rad: differences of roll, pitch and yaw, each wrapped. Where the reference's x axis is within 30 deg of the
+  /// vertical (an imu on its side, EuRoC's rig) these mean nothing: there the turn about the frame's x, y and z.
+  Eigen::Vector3d angles = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();  ///< rad, log(q_reference^-1 q_estimate), vehicle axes
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, vehicle axes (frame axes without attitude)
   Validity validity = Validity::kInvalid;
 
   [[nodiscard]] double norm() const { return position_frame.norm(); }
@@ -32,6 +34,10 @@ struct ReferenceKind {
 /// The vehicle's axes are the reference's where it has attitude and the estimate's otherwise.
 PoseError pose_error(const PosePair& pair, const ReferenceKind& kind);
 std::vector<PoseError> pose_errors(const std::vector<PosePair>& pairs, const ReferenceKind& kind);
+
+/// Axes that PoseError::angles are about, to first order, from vehicle axes: those themselves, or the frame's where the
+/// reference's x axis is within 30 deg of the vertical.
+Eigen::Matrix3d R_angles_vehicle(const Eigen::Quaterniond& reference);
 
 struct AxisErrors {
   Summary horizontal, norm;                 ///< m

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "evaluation/errors.h"
 #include "geometry/so3.h"
 #include "statistics/consistency.h"
 
@@ -99,7 +100,8 @@ std::vector<SigmaSample> sigma_samples(const std::vector<PosePair>& pairs, const
     SigmaSample s;
     s.t_us = pair.reference.t_us;
     s.position_vehicle = (R_frame_vehicle.transpose() * cov_position * R_frame_vehicle).diagonal().cwiseSqrt();
-    s.angles = cov_attitude.diagonal().cwiseSqrt();
+    const Eigen::Matrix3d R_angles = R_angles_vehicle(pair.reference.T_frame_vehicle.q);
+    s.angles = (R_angles * cov_attitude * R_angles.transpose()).diagonal().cwiseSqrt();
     if (const auto value = normalised_square(n.error.head<3>(), cov_position)) s.nees_position = *value / 3.0;
     if (kind.attitude) {
       if (const auto value = normalised_square(n.error.tail<3>(), cov_attitude)) s.nees_attitude = *value / 3.0;

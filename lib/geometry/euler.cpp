@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "geometry/so3.h"
+
 namespace roadfix {
 namespace {
 
@@ -38,6 +40,11 @@ Eigen::Quaterniond quaternion(const YawPitchRoll& a) {
 
 double yaw_of(const Eigen::Quaterniond& q) {
   return std::atan2(2.0 * (q.w() * q.z() + q.x() * q.y()), 1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z()));
+}
+
+double yaw_between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
+  const Eigen::Quaterniond turn = to * from.conjugate();
+  return wrap_angle(2.0 * std::atan2(turn.z(), turn.w()));
 }
 
 }  // namespace roadfix

@@ -21,4 +21,8 @@ Eigen::Quaterniond quaternion(const YawPitchRoll& angles);
 /// Yaw alone, without the other angles; undefined only at the gimbal lock.
 double yaw_of(const Eigen::Quaterniond& q);
 
+/// The turn about z, rad in (-pi, pi], after which `from` comes closest to `to`: the angle about z of to * from^-1. Of
+/// bodies with any axes, at the gimbal lock too; undefined only where z points up in one and down in the other.
+double yaw_between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to);
+
 }  // namespace roadfix

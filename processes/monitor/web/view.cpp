@@ -1,7 +1,6 @@
 #include "monitor/web/view.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "bus/types/message.h"
 #include "geometry/euler.h"
@@ -21,8 +20,6 @@ SE3 yaw_only(const SE3& T) {
   level.q = Eigen::AngleAxisd(yaw_of(T.q), Eigen::Vector3d::UnitZ());
   return level;
 }
-
-double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
 }  // namespace
 
@@ -106,8 +103,7 @@ std::optional<Eigen::Vector2d> DriveView::error(const PoseWatch& watch) const {
     if (pin == pins_.end()) return std::nullopt;
     T = pin->second.T_enu_local * T;
   }
-  return Eigen::Vector2d((T.p - truth->T_frame_vehicle.p).head<2>().norm(),
-                         wrapped(yaw_of(T.q) - yaw_of(truth->T_frame_vehicle.q)));
+  return Eigen::Vector2d((T.p - truth->T_frame_vehicle.p).head<2>().norm(), yaw_between(truth->T_frame_vehicle.q, T.q));
 }
 
 History::Row DriveView::history_row(const HealthReport& report) const {

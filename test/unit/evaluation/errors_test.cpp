@@ -56,6 +56,22 @@ TEST_CASE("errors of roll, pitch and yaw are differences of the angles, on a slo
   CHECK(axes.roll->mean == Approx(0.006));
 }
 
+TEST_CASE("a rig whose x axis points up has errors about level axes and the vertical") {
+  // Euler angles would call a tilt of 0.1 deg a roll and yaw of any size.
+  const Eigen::Quaterniond q_up = exp_q({0, -0.5 * kPi, 0});  // x up
+  const Eigen::Vector3d turn = Eigen::Vector3d(0.1, -0.2, 0.3) * kDegree;
+  const Trajectory on_its_side = changed(kReference, [&](Odometry& pose) {
+    pose.T_frame_vehicle.q = pose.T_frame_vehicle.q * q_up * exp_q({0.02, 0.03, -0.02});
+  });
+  const Trajectory turned =
+      changed(on_its_side, [&](Odometry& pose) { pose.T_frame_vehicle.q = exp_q(turn) * pose.T_frame_vehicle.q; });
+  const AxisErrors axes = axis_errors(pose_errors(associate(turned, on_its_side, false), {}), {});
+  CHECK(axes.roll->mean == Approx(turn.x()));
+  CHECK(axes.pitch->mean == Approx(turn.y()));
+  CHECK(axes.yaw->mean == Approx(turn.z()));
+  CHECK(axes.yaw->max == Approx(turn.z()));
+}
+
 TEST_CASE("yaw errors do not wrap") {
   const auto errors =
       pose_errors(against(changed(kReference,

@@ -139,6 +139,26 @@ TEST_CASE("a tied odometry starts from the reference and shows its own drift fro
   CHECK(report.errors.front().position_frame.z() == Approx(-0.5));
 }
 
+TEST_CASE("a rig whose x axis points up is tied by its turn about the vertical") {
+  // Off by a tilt within its claim. The difference of Euler yaws, which mean nothing there, would turn it by 60
+  // degrees.
+  const Eigen::Quaterniond q_up = exp_q({0, -0.5 * kPi, 0}) * exp_q({0, 1e-3, 2e-3});
+  Reference reference = exact_reference();
+  reference.trajectory =
+      changed(reference.trajectory, [&](Odometry& pose) { pose.T_frame_vehicle.q = pose.T_frame_vehicle.q * q_up; });
+  const SE3 T{exp_q({0, 0, 1.0}), {50.0, 60.0, -7.0}};
+  auto estimate = estimate_of(changed(reference.trajectory, [&](Odometry& pose) {
+    pose.T_frame_vehicle.q = exp_q({2e-3, -1e-3, 0}) * pose.T_frame_vehicle.q;
+    pose.T_frame_vehicle = T * pose.T_frame_vehicle;
+    pose.cov_pose = 4e-6 * Matrix6d::Identity();
+  }));
+  estimate.local_frame = true;
+  const ChannelScore report = evaluate_channel(reference, exact_facts(), estimate, {});
+  REQUIRE(report.honesty.attitude);
+  CHECK(report.honesty.attitude->nees_per_dof < 1.0);
+  CHECK(report.axes.yaw->max < 1e-5);
+}
+
 TEST_CASE("an odometry's covariance is judged from its own start") {
   // Error and sigma of the height grow by 1 cm a second from the start; alignment would centre the error instead.
   const SE3 T{exp_q({0, 0, 1.0}), {50.0, 60.0, -7.0}};

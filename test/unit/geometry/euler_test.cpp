@@ -5,6 +5,7 @@
 #include <random>
 
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 
 namespace roadfix {
 namespace {
@@ -29,6 +30,21 @@ TEST_CASE("signs: yaw to the left, pitch nose down, roll right side down") {
   CHECK((quaternion({0.1, 0.0, 0.0}) * forward).y() > 0.0);
   CHECK((quaternion({0.0, 0.1, 0.0}) * forward).z() < 0.0);
   CHECK((quaternion({0.0, 0.0, 0.1}) * left).z() > 0.0);
+}
+
+TEST_CASE("the yaw between two attitudes is the turn about z that brings them closest") {
+  for (const double pitch : {0.0, 0.1, kPi / 2.0, -kPi / 2.0}) {
+    const Eigen::Quaterniond from = quaternion({0.4, pitch, 0.3});
+    for (const double turn : {-3.0, -0.2, 0.0, 2.5}) {
+      const Eigen::Quaterniond to = exp_q({0, 0, turn}) * from;
+      CHECK(yaw_between(from, to) == Approx(turn).margin(1e-12));
+      CHECK(yaw_between(from, Eigen::Quaterniond(-to.coeffs())) == Approx(turn).margin(1e-12));
+      const Eigen::Quaterniond tilted = exp_q({0.02, -0.01, 0}) * to;
+      const double best = (exp_q({0, 0, yaw_between(from, tilted)}) * from).angularDistance(tilted);
+      for (const double aside : {-1e-3, 1e-3})
+        CHECK(best < (exp_q({0, 0, yaw_between(from, tilted) + aside}) * from).angularDistance(tilted));
+    }
+  }
 }
 
 TEST_CASE("at the gimbal lock the rotation is kept and roll is zero") {
