@@ -6,9 +6,21 @@
 
 namespace roadfix {
 
+namespace {
+
+constexpr double kUnknownUp_deg = 60.0;  // standard deviation of roll or pitch that no mounting has
+
+bool knows_up(const Calibration& calibration) {
+  const auto& mounting = calibration.mounting;
+  return !mounting || !mounting->std_deg || mounting->std_deg->head<2>().maxCoeff() < kUnknownUp_deg;
+}
+
+}  // namespace
+
 VoMode mode_for(const Calibration& calibration) {
   const SensorsCalibration& s = calibration.sensors;
-  return s.imu && !s.wheels && !s.camera_right ? VoMode::kMsckf : VoMode::kKeyframe;
+  const bool inertial = s.imu && !s.wheels && (!s.camera_right || !knows_up(calibration));
+  return inertial ? VoMode::kMsckf : VoMode::kKeyframe;
 }
 
 std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& given,

@@ -57,7 +57,8 @@ void visit(VoTrackerConfig& c, Visitor& v) {
 
 /// The mode of a configuration that leaves it open. One camera beside an IMU without wheels: msckf, whose lengths are
 /// the IMU's own; the keyframe tracker would have them from the INS, which knows its speed no better than the pose that
-/// vision is to hold. Otherwise keyframe.
+/// vision is to hold. Two eyes beside an IMU without wheels, of a rig of which nobody knows what side is up (EuRoC's):
+/// msckf, too, which levels itself by gravity. Otherwise keyframe.
 VoMode mode_for(const Calibration& calibration);
 
 /// `superpoint_weights`: the bytes of superpoint_model. Throws where the calibration has no camera or not all of one.

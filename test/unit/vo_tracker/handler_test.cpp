@@ -174,6 +174,13 @@ TEST_CASE("a mode that is left open follows the sensors: lengths from the IMU wh
   c.sensors.wheels.reset();
   c.sensors.camera_right = calibration(true).sensors.camera_right;
   CHECK(clock_of({}) == "CAMERA_RIGHT");
+  // A rig on its side: only gravity tells what is up, and the keyframe tracker does not feel it.
+  c.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d(10.0, 10.0, 180.0)};
+  CHECK(clock_of({}) == "CAMERA_RIGHT");
+  c.mounting->std_deg = Eigen::Vector3d::Constant(180.0);
+  CHECK(clock_of({}) == "IMU");
+  c.sensors.wheels.emplace();
+  CHECK(clock_of({}) == "CAMERA_RIGHT");
 }
 
 TEST_CASE("what the calibration lacks is named at the start") {
