@@ -249,7 +249,7 @@ TEST_CASE("an estimate without figures says why") {
   using Catch::Matchers::Contains;
   const Reference reference = exact_reference();
   const int64_t end_us = reference.trajectory.poses.back().t_us;
-  const auto why = [&](Trajectory trajectory, DriveFacts facts, std::optional<Alignment> alignment = {}) {
+  const auto why = [&](Trajectory trajectory, const DriveFacts& facts, std::optional<Alignment> alignment = {}) {
     EvaluationOptions options;
     options.alignment = alignment;
     const ChannelScore score = evaluate_channel(reference, facts, estimate_of(std::move(trajectory)), options);
