@@ -77,7 +77,7 @@ class Path {
   double yaw_rate_ = 0.0;
 };
 
-/// Points on the walls, the floor and the ceiling.
+/// Points on the walls, the floor and the ceiling, which hide nothing.
 std::vector<Eigen::Vector3d> room(uint64_t seed) {
   RandomStream random(seed, 2);
   const auto within = [&](double a, double b) { return a + (b - a) * random.uniform(); };

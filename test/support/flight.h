@@ -10,8 +10,8 @@ namespace roadfix::test {
 struct FlightConfig {
   double duration_s = 40.0;
   double standing_s = 3.0;  ///< at the start; then it takes two seconds to be under way
-  double speed_mps = 1.0;   ///< about the fastest along each axis
-  double turn_rad = 0.3;    ///< about the largest roll and pitch; yaw goes round
+  double speed_mps = 1.0;   ///< the fastest along each axis
+  double turn_rad = 0.3;    ///< of roll and pitch, which reach twice that from where they begin; yaw goes round
   double noise_px = 0.7;
   double gyro_noise = 1.7e-4, accel_noise = 2.0e-3;   ///< rad/s, m/s2 over sqrt(Hz)
   double gyro_bias_std = 0.05, accel_bias_std = 0.1;  ///< rad/s, m/s2

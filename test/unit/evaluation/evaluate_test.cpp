@@ -140,8 +140,7 @@ TEST_CASE("a tied odometry starts from the reference and shows its own drift fro
 }
 
 TEST_CASE("a rig whose x axis points up is tied by its turn about the vertical") {
-  // Off by a tilt within its claim. The difference of Euler yaws, which mean nothing there, would turn it by 60
-  // degrees.
+  // Off by a tilt within its claim. The difference of Euler yaws means nothing there.
   const Eigen::Quaterniond q_up = exp_q({0, -0.5 * kPi, 0}) * exp_q({0, 1e-3, 2e-3});
   Reference reference = exact_reference();
   reference.trajectory =
