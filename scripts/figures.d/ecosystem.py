@@ -1,0 +1,3 @@
+"""ecosystem: Roadfix among other tools. Each part adds its rows to MEASUREMENTS below its functions."""
+
+MEASUREMENTS = {}
