@@ -3,20 +3,20 @@
 ///
 ///   template <class Visitor>
 ///   void visit(WheelConfig& c, Visitor& v) {
-///     v.number("gyro_noise_radps_per_rthz", c.gyro_noise, 1e-7, 1.0);        // key, value, min, max
+///     v.number("gyro_noise_radps_per_rthz", c.gyro_noise, 1e-7, 1.0);       // key, value, min, max
 ///     v.integer("window", c.window, 1, 1000);
 ///     v.boolean("use_mag", c.use_mag);
 ///     v.choice("mode", c.mode, {{"klt", Mode::kKlt}, {"orb", Mode::kOrb}});
-///     v.vector("lever_arm_m", c.lever_arm, -20.0, 20.0);                     // fixed Eigen vectors and matrices
+///     v.vector("lever_arm_m", c.lever_arm, -20.0, 20.0);                    // fixed Eigen vectors and matrices
 ///     v.text("name", c.name);
-///     v.optional_number("x_m", c.x, lo, hi);                                 // std::optional<double>; also optional_
-///                                                                            // integer boolean text choice vector
-///                                                                            group
-///     v.numbers("weights", c.weights, lo, hi);                               // std::vector; also integers texts
-///     choices v.group("gate", c.gate);                                               // a nested struct
-///     v.groups("windows", c.windows);                                          // std::vector of nested structs
-///     v.require("name");                                                     // everything else may be absent
-///     v.check("q_wxyz", is_unit(c.q), "must have unit norm");                // what no range can say
+///     v.optional_number("x_m", c.x, lo, hi);                                // std::optional<double>; likewise
+///                                                                           // optional_integer, _boolean, _text,
+///                                                                           // _choice, _vector, _group
+///     v.numbers("weights", c.weights, lo, hi);                              // std::vector; integers, texts, choices
+///     v.group("gate", c.gate);                                              // a nested struct
+///     v.groups("windows", c.windows);                                       // std::vector of nested structs
+///     v.require("name");                                                    // all other keys are optional
+///     v.check("q_wxyz", is_unit(c.q), "must have unit norm");               // conditions that are not a range
 ///   }
 ///
 /// Reading refuses, with file, line, key path, value and allowed range (ConfigError): an unknown key (naming the one
