@@ -5,7 +5,7 @@
 namespace roadfix {
 namespace {
 
-/// Chord over arc, sin(h) / h with h half the angle turned (M.16), and its derivative by h.
+/// Ratio of chord to arc, sin(h) / h with h half the angle turned (W.4.3), and its derivative.
 struct Chord {
   double ratio = 1.0;
   double slope = 0.0;
@@ -18,18 +18,18 @@ Chord chord(double h) {
 
 }  // namespace
 
-Eigen::Vector3d displacement(const DriveStep& t, StepForm form) {
+Eigen::Vector3d displacement(const ArcStep& t, StepForm form) {
   const double half = form == StepForm::kArc ? 0.5 * t.yaw_change : 0.0;
-  const double direction = t.yaw + half + t.side;
+  const double direction = t.yaw + half + t.crab_angle;
   const double level = t.distance * chord(half).ratio * std::cos(t.pitch);
   return {level * std::cos(direction), level * std::sin(direction), -t.distance * std::sin(t.pitch)};
 }
 
-Eigen::Matrix<double, 3, 5> displacement_jacobian(const DriveStep& t, StepForm form) {
+Eigen::Matrix<double, 3, 5> displacement_jacobian(const ArcStep& t, StepForm form) {
   const bool arc = form == StepForm::kArc;
   const double half = arc ? 0.5 * t.yaw_change : 0.0;
   const Chord c = chord(half);
-  const double cos_d = std::cos(t.yaw + half + t.side), sin_d = std::sin(t.yaw + half + t.side);
+  const double cos_d = std::cos(t.yaw + half + t.crab_angle), sin_d = std::sin(t.yaw + half + t.crab_angle);
   const double level = t.distance * c.ratio * std::cos(t.pitch);
   const Eigen::Vector3d by_direction(-level * sin_d, level * cos_d, 0.0);
   const double stretch = t.distance * c.slope * std::cos(t.pitch);

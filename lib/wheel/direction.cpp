@@ -4,12 +4,12 @@
 
 namespace roadfix {
 
-void add_magnitude(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude, double predicted,
-                   double variance) {
-  // log N(m - v) - log N(m + v) = 2 m v / S
+void update_direction(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude,
+                      double predicted, double variance) {
+  // (W.8.1): log N(m - v) - log N(m + v) = 2 m v / S
   const double evidence = 2.0 * magnitude * predicted / variance;
   if (d.sign != 0) {
-    if (magnitude < kReversible && d.sign * evidence < -limits.evidence) d = {evidence > 0.0 ? 1 : -1, false, {}};
+    if (magnitude < kMaxReversalSpeed && d.sign * evidence < -limits.evidence) d = {evidence > 0.0 ? 1 : -1, false, {}};
     return;
   }
   if (evidence > limits.evidence) {

@@ -1,5 +1,4 @@
-/// The sign of wheels that tell only magnitudes: the accelerometer's speed says which way the car pulled away
-/// (MODEL.md, section 8).
+/// Sign of unsigned wheel speeds: a likelihood ratio test against the speed predicted from the accelerometer, (W.8.1).
 #pragma once
 
 #include <cstdint>
@@ -9,19 +8,19 @@ namespace roadfix {
 
 struct DirectionState {
   int sign = 0;          ///< +1 forward, -1 reverse, 0 undecided
-  bool assumed = false;  ///< forward for lack of evidence
+  bool assumed = false;  ///< forward was assumed because no evidence was available
   std::optional<int64_t> undecided_since_us;
 };
 
 struct DirectionLimits {
-  double evidence = 0.0;  ///< log-likelihood ratio
-  double timeout = 0.0;   ///< s
+  double evidence = 0.0;  ///< log-likelihood ratio required for a decision
+  double timeout = 0.0;   ///< s, after which forward is assumed
 };
 
-/// Takes one magnitude (m/s) against the speed that the accelerometer predicts with the given innovation variance.
-/// Below kReversible the sign of a moving car may change.
-inline constexpr double kReversible = 0.5;  ///< m/s
-void add_magnitude(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude, double predicted,
-                   double variance);
+/// Updates the sign with one speed magnitude (m/s), the predicted speed and the innovation variance. The sign of a
+/// moving vehicle may change only below kMaxReversalSpeed.
+inline constexpr double kMaxReversalSpeed = 0.5;  ///< m/s
+void update_direction(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude,
+                      double predicted, double variance);
 
 }  // namespace roadfix

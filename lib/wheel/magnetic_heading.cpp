@@ -5,7 +5,7 @@
 namespace roadfix {
 namespace {
 
-/// Ry(pitch) Rx(roll), (M.7).
+/// Ry(pitch) Rx(roll), (W.2.1).
 Eigen::Matrix3d tilt(double roll, double pitch) {
   return (Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
       .toRotationMatrix();
@@ -37,7 +37,7 @@ std::optional<MagneticYaw> magnetic_yaw(const Eigen::Vector3d& field, double rol
 double printed_magnetic_heading(const Eigen::Vector3d& m, double roll, double pitch) {
   const double x = m.x() * std::cos(pitch) + m.y() * std::sin(roll) - m.z() * std::cos(roll) * std::sin(pitch);
   const double y = m.y() * std::cos(roll) + m.z() * std::sin(pitch);
-  return std::atan2(-y, x);  // (7) with the quadrant, and the sign that makes it right at zero tilt
+  return std::atan2(-y, x);  // equation 7 with the quadrant, and the sign that is right at zero tilt
 }
 
 }  // namespace roadfix

@@ -1,4 +1,4 @@
-/// One interval of the wheel odometry: mean and covariance (MODEL.md (M.18) to (M.25)).
+/// Propagation of the wheel odometry over one interval: mean and covariance (MODEL.md (W.5.1) to (W.5.8)).
 #pragma once
 
 #include <optional>
@@ -8,25 +8,25 @@
 
 namespace roadfix {
 
-/// What drives the state through one interval.
+/// Inputs of one propagation interval.
 struct WheelStep {
   double dt = 0.0;                                  ///< s, > 0
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< rad/s, raw
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< m/s2, raw specific force
-  bool standing = false;                            ///< position and yaw do not move, speed is zero
-  bool turning = false;                             ///< while standing: the yaw moves nevertheless
-  std::optional<double> blind_acceleration;         ///< m/s2: no imu; accel is not used
+  bool standing = false;                            ///< zero speed; position and yaw are constant
+  bool turning = false;                             ///< at standstill: the yaw still changes (turntable, ferry)
+  std::optional<double> assumed_acceleration;       ///< m/s2, without IMU: replaces the accelerometer
   StepForm form = StepForm::kArc;
 };
 
-/// What levels the tilt: means over one interval of the wheels, so that the force and the wheels' acceleration, which
-/// is taken off it, are of the same time. A lag of 50 ms would kick the pitch by 3 mrad at every start and stop.
-struct PlumbLine {
+/// Tilt measurement from the direction of gravity. All values are means over one interval between two wheel samples, so
+/// that the specific force and the wheel acceleration subtracted from it are of the same time.
+struct GravityMeasurement {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< m/s2, raw specific force
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< rad/s, raw
-  double speed_rate = 0.0;                          ///< m/s2, of the wheels
-  bool correct_acceleration = true;                 ///< false: paper B (1), (2) with the right axes
-  double share = 0.0;                               ///< of the accelerometer's angles
+  double speed_rate = 0.0;                          ///< m/s2, wheel acceleration
+  bool correct_acceleration = true;                 ///< false: Ock et al. 2020 (1), (2) with the axes corrected
+  double share = 0.0;                               ///< weight of the accelerometer's angles, [0, 1]
 };
 
 struct WheelNoise {
@@ -34,28 +34,28 @@ struct WheelNoise {
   double accel = 0.0;       ///< m/s2 per sqrt(Hz)
   double gyro_walk = 0.0;   ///< rad/s per sqrt(s)
   double accel_walk = 0.0;  ///< m/s2 per sqrt(s)
-  double side = 0.0;        ///< rad per sqrt(Hz)
-  double climb = 0.0;       ///< rad per sqrt(Hz)
+  double sideslip = 0.0;    ///< rad per sqrt(Hz), direction of travel, lateral
+  double heave = 0.0;       ///< rad per sqrt(Hz), direction of travel, vertical
 };
 
-/// Normal gravity differs by 0.5 % between equator and pole, 0.05 m/s2: within the accelerometer's bias.
+/// Normal gravity differs by 0.5 % between equator and pole, 0.05 m/s2: covered by the accelerometer bias.
 inline constexpr double kStandardGravity = 9.80665;
 
-/// Mean after the interval (M.18) to (M.21) and its Jacobian by x (M.22), (M.23).
+/// Mean after the interval, (W.5.1) to (W.5.4), and its Jacobian, (W.5.5), (W.5.6).
 WheelVector propagated_mean(const WheelVector& x, const WheelStep& step);
 WheelCovariance transition(const WheelVector& x, const WheelStep& step);
 
-/// Force left for the plumb line: raw, less bias, less the wheels' acceleration where asked for (M.20).
-Eigen::Vector3d plumb_force(const WheelVector& x, const PlumbLine& plumb);
+/// Reaction to gravity: specific force less bias and, where configured, less the acceleration of the vehicle (W.5.3).
+Eigen::Vector3d gravity_reaction(const WheelVector& x, const GravityMeasurement& gravity);
 
-/// Mean with roll and pitch drawn to the plumb line, (M.5), and its Jacobian by x.
-WheelVector levelled_mean(const WheelVector& x, const PlumbLine& plumb);
-WheelCovariance levelling(const WheelVector& x, const PlumbLine& plumb);
+/// Mean after the complementary filter's tilt correction, (W.1.6), and its Jacobian.
+WheelVector levelled_mean(const WheelVector& x, const GravityMeasurement& gravity);
+WheelCovariance levelling_jacobian(const WheelVector& x, const GravityMeasurement& gravity);
 
-/// Mean and covariance after the interval (M.24), (M.25).
+/// Mean and covariance after the interval (W.5.7).
 void propagate(WheelState& state, const WheelStep& step, const WheelNoise& noise);
 
-/// Mean and covariance after levelling; force_sigma: white error of the mean force, m/s2 per axis.
-void level(WheelState& state, const PlumbLine& plumb, double force_sigma);
+/// Mean and covariance after the tilt correction (W.5.8); force_sigma: white noise of the mean force, m/s2 per axis.
+void update_tilt(WheelState& state, const GravityMeasurement& gravity, double force_sigma);
 
 }  // namespace roadfix

@@ -1,4 +1,4 @@
-/// What the wheel odometry knows about the vehicle's sensors and how it is tuned. Keys and ranges in visit().
+/// Sensor parameters and tuning of the wheel odometry. Keys and ranges in visit().
 #pragma once
 
 #include <Eigen/Dense>
@@ -10,7 +10,7 @@
 
 namespace roadfix {
 
-/// Facts about the vehicle (calibration.yaml); the defaults are those of a car about which nothing is known.
+/// Vehicle parameters (calibration.yaml); the defaults apply to an uncalibrated vehicle.
 struct WheelSensors {
   double gyro_noise = 2e-4;          ///< rad/s per sqrt(Hz)
   double accel_noise = 3e-3;         ///< m/s2 per sqrt(Hz)
@@ -21,47 +21,52 @@ struct WheelSensors {
   double gyro_scale_std = 2e-3;      ///< relative
   double wheel_scale_std = 0.01;     ///< relative
   double wheel_noise = 0.05;         ///< m/s per sample
-  double wheel_yaw_noise = 0.05;     ///< rad/s per sample, of the sides' or the car's own yaw rate
-  double wheel_yaw_bias_std = 0.02;  ///< rad/s, of the same
+  double wheel_yaw_noise = 0.05;     ///< rad/s per sample, of the yaw rate from left and right wheels or from the
+                                     ///< vehicle's own sensor
+  double wheel_yaw_bias_std = 0.02;  ///< rad/s, bias of the same
   Eigen::Vector3d mounting_std =
-      Eigen::Vector3d::Constant(0.3 * kDegree);              ///< rad, imu against the direction of travel
-  double side = 0.0;                                         ///< rad, direction of travel to the left of the imu's x
-  double climb = 0.0;                                        ///< rad, the same below it
-  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();      ///< m, imu axes: the rear axle's centre
+      Eigen::Vector3d::Constant(0.3 * kDegree);              ///< rad, misalignment between IMU and direction of travel
+  double mounting_yaw = 0.0;                                 ///< rad, direction of travel to the left of the imu's x
+  double mounting_pitch = 0.0;                               ///< rad, direction of travel below the IMU's x
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();      ///< m, IMU axes: lever arm of the rear-axle centre
   Eigen::Vector3d p_imu_axle_std = Eigen::Vector3d::Zero();  ///< m
   std::optional<double> track_width;                         ///< m
   Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();    ///< uT, subtracted from the field first
-  Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();   ///< multiplies what is left
+  Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();   ///< applied after the hard-iron correction
 };
 
-/// Where the yaw rate comes from. kAutomatic: the gyro; without one the car's own sensor; without that the sides.
+/// Source of the yaw rate. kAutomatic: the gyro, else the vehicle's own sensor, else left and right wheels.
 enum class YawSource { kAutomatic, kGyro, kVehicleSensor, kWheelSides };
 
 struct WheelTuning {
   YawSource yaw_source = YawSource::kAutomatic;
   SideRule side_rule = SideRule::kRearAxle;
   StepForm step_form = StepForm::kArc;
-  bool correct_acceleration = true;  ///< take the wheels' acceleration off the accelerometer; false: paper B (1)-(4)
-  bool use_mag = false;              ///< steel bridges and car parks bend the field by more than the gyro drifts
+  bool correct_acceleration = true;  ///< subtract the wheel acceleration from the specific force; false: Ock et al.
+                                     ///< 2020 (1)-(4)
+  bool use_mag = false;              ///< off by default: steel structures disturb the field by more than the gyro
+                                     ///< drifts
   double tilt_time_constant = 3.0;   ///< s, of the complementary filter
-  double tilt_gate = 1.0;            ///< m/s2: a corrected force further from g than this is no plumb line
-  double accel_disturbance = 0.02;   ///< m/s2 per sqrt(Hz), vibration and what the wheels do not tell
-  double side_noise = 1e-3;          ///< rad per sqrt(Hz), wander of the direction of travel to the side
-  double climb_noise = 2e-3;         ///< rad per sqrt(Hz), the same upwards: suspension
-  double mag_noise = 0.05;           ///< rad, of one heading
-  double mag_interval = 10.0;        ///< s, correlation time of the heading's error: one is used per interval
-  double mag_gate = 0.1;            ///< relative change of the field's strength, and of its dip in rad, that refuses it
-  double standing_speed = 0.15;     ///< m/s, wheels below this ...
-  double standing_rate = 0.02;      ///< rad/s, and turning below this ...
-  double standing_after = 0.6;      ///< s, for this long: the car stands
-  double align_time = 0.5;          ///< s of accelerometer mean before the first pose
-  double slip_gate = 5.0;           ///< sigma of wheel speed against the accelerometer's
-  double slip_timeout = 3.0;        ///< s of disagreement after which the wheels are believed again
+  double tilt_gate = 1.0;            ///< m/s2: a corrected force that differs more from g is not used as gravity
+  double accel_disturbance = 0.02;   ///< m/s2 per sqrt(Hz), vibration and unmodelled acceleration
+  double sideslip_noise = 1e-3;      ///< rad per sqrt(Hz), process noise of the direction of travel, lateral
+                                     ///< (sideslip)
+  double heave_noise = 2e-3;         ///< rad per sqrt(Hz), the same, vertical (suspension)
+  double mag_noise = 0.05;           ///< rad, of one heading measurement
+  double mag_interval = 10.0;        ///< s, correlation time of the heading error: one measurement is used per interval
+  double mag_gate = 0.1;            ///< relative change of field strength, and of dip in rad, beyond which a heading is
+                                    ///< rejected
+  double standing_speed = 0.15;     ///< m/s, standstill: wheel speed below this ...
+  double standing_rate = 0.02;      ///< rad/s, and change of the angular rate below this ...
+  double standing_after = 0.6;      ///< s, for this long
+  double align_time = 0.5;          ///< s, accelerometer mean before the first pose
+  double slip_gate = 5.0;           ///< sigma, innovation gate of the wheel speed
+  double slip_timeout = 3.0;        ///< s of consecutive rejections after which the wheel speed is accepted again
   double direction_evidence = 6.0;  ///< log-likelihood ratio that decides between forward and reverse
-  double direction_timeout = 2.0;   ///< s after which forward is assumed, and said
-  double imu_timeout = 0.1;         ///< s without imu after which the wheels carry on alone
+  double direction_timeout = 2.0;   ///< s after which forward is assumed and reported
+  double imu_timeout = 0.1;         ///< s without IMU after which the wheels alone propagate the state
   double wheel_timeout = 0.5;       ///< s without wheels after which the pose is coasting
-  double restart_gap = 5.0;         ///< s without any input after which the pose counts as reset
+  double restart_gap = 5.0;         ///< s without any input after which the reset counter increases
 };
 
 struct WheelConfig {
@@ -84,8 +89,8 @@ void visit(WheelTuning& c, Visitor& v) {
   v.number("tilt_time_constant_s", c.tilt_time_constant, 0.05, 1000.0);
   v.number("tilt_gate_mps2", c.tilt_gate, 0.05, 100.0);
   v.number("accel_disturbance_mps2_per_rthz", c.accel_disturbance, 0.0, 10.0);
-  v.number("side_noise_rad_per_rthz", c.side_noise, 0.0, 1.0);
-  v.number("climb_noise_rad_per_rthz", c.climb_noise, 0.0, 1.0);
+  v.number("side_noise_rad_per_rthz", c.sideslip_noise, 0.0, 1.0);
+  v.number("climb_noise_rad_per_rthz", c.heave_noise, 0.0, 1.0);
   v.number("mag_noise_rad", c.mag_noise, 1e-4, 3.0);
   v.number("mag_interval_s", c.mag_interval, 0.0, 1000.0);
   v.number("mag_gate", c.mag_gate, 0.001, 10.0);

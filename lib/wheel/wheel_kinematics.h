@@ -1,4 +1,5 @@
-/// From wheels to the speed and the yaw rate of the rear axle's centre (paper B (8), (9); MODEL.md (M.11) to (M.13)).
+/// Speed and yaw rate of the rear-axle centre from wheel speeds (Ock et al. 2020 (8), (9); MODEL.md (W.3.1) to
+/// (W.3.3)).
 #pragma once
 
 #include <array>
@@ -9,12 +10,12 @@
 
 namespace roadfix {
 
-/// Speed of a wheel's rim from its turn between two readings: radius in m, ticks_per_turn of the encoder (M.11). Paper
-/// B calls r a diameter and leaves the interval out; with wheel angles it is the radius, and the difference is a rate.
+/// Circumferential speed of a wheel from its encoder difference between two readings: radius in m, ticks_per_turn of
+/// the encoder (W.3.1). Ock et al. 2020 call r a diameter and omit the interval.
 double rim_speed(int64_t ticks, double ticks_per_turn, double radius_m, double dt_s);
 
-/// Which of four wheels make a side. The paper's mean of front and rear fits a skid-steered robot; a car's front wheels
-/// point along the steering angle and run faster than the axle in a turn.
+/// Which of four wheels define the left and right speed. The mean of front and rear (Ock et al. 2020) suits a
+/// skid-steered robot; the front wheels of a car roll along the steering angle and are faster than the axle in a turn.
 enum class SideRule { kRearAxle, kMeanOfFrontAndRear };
 
 struct SideSpeeds {
@@ -22,17 +23,17 @@ struct SideSpeeds {
   double right = 0.0;  ///< m/s
 };
 
-/// Left and right side of {front left, front right, rear left, rear right}, paper B (8).
+/// Left and right speed from {front left, front right, rear left, rear right}, Ock et al. 2020 (8).
 SideSpeeds side_speeds(const std::array<double, 4>& speeds, SideRule rule);
 
 struct WheelMotion {
   double speed = 0.0;                     ///< m/s, of the rear axle's centre; a magnitude where the sign is unknown
-  std::optional<double> sides_yaw_rate;   ///< rad/s, from the sides, where there are four speeds and a track width
-  std::optional<double> sensor_yaw_rate;  ///< rad/s, of the car's own sensor
+  std::optional<double> sides_yaw_rate;   ///< rad/s, from left and right speed, given four speeds and a track width
+  std::optional<double> sensor_yaw_rate;  ///< rad/s, of the vehicle's own sensor
 };
 
-/// Speed and yaw rate of one sample (M.12), (M.13), paper B (9). With direction kReverse the magnitudes change sign
-/// together, the yaw rate of the sides with them; with kUnknown the yaw rate of the sides is withheld.
+/// Speed and yaw rate of one sample (W.3.2), (W.3.3), Ock et al. 2020 (9). Direction kReverse negates the speeds and
+/// the yaw rate from them; kUnknown gives no yaw rate from the wheels.
 WheelMotion wheel_motion(const WheelSample& sample, std::optional<double> track_width_m, SideRule rule);
 
 }  // namespace roadfix

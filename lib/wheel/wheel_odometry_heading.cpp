@@ -1,4 +1,4 @@
-// What the magnetometer does to the state (MODEL.md, section 9).
+// Magnetometer update (MODEL.md, section 9).
 #include <cmath>
 
 #include "geometry/so3.h"
@@ -7,7 +7,7 @@
 
 namespace roadfix {
 
-using namespace wheel;  // the names of the error state
+using namespace wheel;  // indices of the error state
 namespace {
 
 constexpr double kMicrotesla = 1e-6;  ///< T
@@ -19,7 +19,7 @@ WheelInputStatus WheelOdometry::add(const MagSample& mag) {
   if (!t.use_mag) return WheelInputStatus::kDisabled;
   if (!mag.field.allFinite()) return WheelInputStatus::kBadValue;
   if (!started_) return WheelInputStatus::kAligning;
-  if (standing_.standing && mag_us_) return WheelInputStatus::kNotDue;  // a standing pose does not move
+  if (standstill_.standing && mag_us_) return WheelInputStatus::kNotDue;  // the pose is constant at standstill
   if (mag_us_ && seconds_between(*mag_us_, mag.t_us) < t.mag_interval) return WheelInputStatus::kNotDue;
   const Tilt tilt = state_.tilt();
   const Eigen::Vector3d field = config_.sensors.soft_iron * (mag.field - kMicrotesla * config_.sensors.hard_iron_ut);
@@ -31,7 +31,7 @@ WheelInputStatus WheelOdometry::add(const MagSample& mag) {
     mag_strength_ = strength;
     mag_dip_ = dip;
     state_.x(kMagOffset) = wrap_angle(measured->yaw - state_.x(kYaw));
-    decouple(state_.P, kMagOffset, kPi);  // the update below makes it known, to the heading's noise and the yaw's
+    decouple(state_.P, kMagOffset, kPi);  // the update below reduces it to the noise of the heading and the yaw
   } else if (std::abs(strength / mag_strength_ - 1.0) > t.mag_gate || std::abs(dip - mag_dip_) > t.mag_gate) {
     return WheelInputStatus::kGated;
   }
@@ -41,7 +41,7 @@ WheelInputStatus WheelOdometry::add(const MagSample& mag) {
   H.segment<2>(kRoll) = -measured->by_tilt.transpose();
   const double innovation = wrap_angle(measured->yaw - state_.x(kYaw) - state_.x(kMagOffset));
   const double dt = seconds_between(t_us_, mag.t_us);
-  const double turned = standing_.standing ? 0.0 : (gyro_.z() - state_.x(kGyroBias + 2)) * dt;
+  const double turned = standstill_.standing ? 0.0 : (gyro_.z() - state_.x(kGyroBias + 2)) * dt;
   schmidt_update(state_, H, wrap_angle(innovation - turned), t.mag_noise * t.mag_noise,
                  {kPos, kPos + 1, kPos + 2, kYaw, kGyroBias + 2, kMagOffset});
   mag_us_ = mag.t_us;

@@ -1,21 +1,22 @@
-// What the wheel odometry tells: pose, report, snapshot (MODEL.md, section 10).
+// Outputs of the wheel odometry: pose, report, snapshot (MODEL.md, section 10).
 #include <cmath>
 
 #include "geometry/euler.h"
 #include "geometry/so3.h"
-#include "wheel/travel.h"
+#include "wheel/axle_motion.h"
 #include "wheel/wheel_odometry.h"
 
 namespace roadfix {
 
-using namespace wheel;  // the names of the error state
+using namespace wheel;  // indices of the error state
 namespace {
 
-constexpr double kLostSpeedSigma = 3.0;  ///< m/s: the speed is no longer known
-constexpr double kLostYawSigma = 0.8;    ///< rad: neither is the direction
-constexpr double kTurnOnChange = 0.3;    ///< of a bias's spread: what it changes from one start to the next (assumed)
+constexpr double kLostSpeedSigma = 3.0;  ///< m/s: the speed is lost
+constexpr double kLostYawSigma = 0.8;    ///< rad: the yaw is lost
+constexpr double kTurnOnChange = 0.3;    ///< of the calibrated bias sigma: change between two starts (assumed)
 
-/// Rotation error in vehicle axes by (roll, pitch, yaw) errors: the inverse of the Euler rates' matrix (M.28).
+/// Jacobian from (roll, pitch, yaw) errors to the rotation error in vehicle axes: inverse of the Euler rate matrix
+/// (W.10.1).
 Eigen::Matrix3d rotation_by_angles(const Tilt& tilt) { return euler_rates_by_omega(tilt).inverse(); }
 
 }  // namespace
@@ -26,19 +27,20 @@ Odometry WheelOdometry::odometry() const {
   if (!started_) return out;
   const WheelVector& x = state_.x;
   const WheelCovariance& P = state_.P;
-  // The axle has gone by kPos since the start, the imu also by what the turn since then has made of its place (M.29).
+  // The state is the displacement of the axle; the lever arm rotated by the yaw since the start gives that of the IMU
+  // (W.10.2).
   const WheelSensors& s = config_.sensors;
   const Eigen::Matrix3d tilted = quaternion({0.0, x(kPitch), x(kRoll)}).toRotationMatrix();
   const Eigen::Matrix3d turned = quaternion({x(kYaw), 0.0, 0.0}).toRotationMatrix();
-  const Eigen::Matrix3d by_place = (Eigen::Matrix3d::Identity() - turned) * tilted;
-  out.T_frame_vehicle.p = x.segment<3>(kPos) + by_place * s.p_imu_axle;
+  const Eigen::Matrix3d by_lever_arm = (Eigen::Matrix3d::Identity() - turned) * tilted;
+  out.T_frame_vehicle.p = x.segment<3>(kPos) + by_lever_arm * s.p_imu_axle;
   out.T_frame_vehicle.q = quaternion({x(kYaw), x(kPitch), x(kRoll)});
-  if (!standing_.standing) {
+  if (!standstill_.standing) {
     out.angular_rate = gyro_;
     if (!gyro_yaw_) out.angular_rate.z() = wheel_yaw_rate_.value_or(0.0);
     out.angular_rate -= x.segment<3>(kGyroBias);
   }
-  const Eigen::Vector3d e = travel_direction(x(kSide), x(kClimb));
+  const Eigen::Vector3d e = travel_direction(x(kMountingYaw), x(kMountingPitch));
   out.velocity = x(kSpeed) * e + s.p_imu_axle.cross(out.angular_rate);
 
   Eigen::Matrix<double, 6, kWheelStates> J = Eigen::Matrix<double, 6, kWheelStates>::Zero();
@@ -49,19 +51,20 @@ Odometry WheelOdometry::odometry() const {
   J.block<3, 1>(3, kPitch) = by_angles.col(1);
   J.block<3, 1>(3, kYaw) = by_angles.col(2);
   out.cov_pose = J * P * J.transpose();
-  const auto with_place = [&](const Eigen::Matrix3d& by) -> Eigen::Matrix3d {
+  const auto lever_arm_covariance = [&](const Eigen::Matrix3d& by) -> Eigen::Matrix3d {
     const Eigen::Matrix3d root = by * s.p_imu_axle_std.asDiagonal();
     return root * root.transpose();
   };
-  out.cov_pose.topLeftCorner<3, 3>() += with_place(by_place);
+  out.cov_pose.topLeftCorner<3, 3>() += lever_arm_covariance(by_lever_arm);
 
   const double v = x(kSpeed), t = config_.tuning.align_time;
-  const double side = config_.tuning.side_noise, climb = config_.tuning.climb_noise;
-  const Eigen::Matrix<double, 3, 2> by_direction = v * travel_direction_jacobian(x(kSide), x(kClimb));
-  const Eigen::Vector2d angles(P(kSide, kSide) + side * side / t, P(kClimb, kClimb) + climb * climb / t);
+  const double sideslip = config_.tuning.sideslip_noise, heave = config_.tuning.heave_noise;
+  const Eigen::Matrix<double, 3, 2> by_direction = v * travel_direction_jacobian(x(kMountingYaw), x(kMountingPitch));
+  const Eigen::Vector2d angles(P(kMountingYaw, kMountingYaw) + sideslip * sideslip / t,
+                               P(kMountingPitch, kMountingPitch) + heave * heave / t);
   out.cov_velocity =
       P(kSpeed, kSpeed) * Eigen::Matrix3d::Identity() + by_direction * angles.asDiagonal() * by_direction.transpose();
-  out.cov_velocity += with_place(skew(out.angular_rate));
+  out.cov_velocity += lever_arm_covariance(skew(out.angular_rate));
   out.validity = report().validity;
   return out;
 }
@@ -69,7 +72,7 @@ Odometry WheelOdometry::odometry() const {
 WheelReport WheelOdometry::report() const {
   WheelReport r;
   r.reset_counter = reset_counter_;
-  r.standing = standing_.standing;
+  r.standing = standstill_.standing;
   r.slipping = slip_since_us_.has_value();
   if (!started_) {
     r.phase = wheels_us_ && imu_us_ ? WheelPhase::kAligning : WheelPhase::kWaiting;
@@ -107,15 +110,15 @@ std::optional<WheelMemory> WheelOdometry::memory() const {
   return memory;
 }
 
-void WheelOdometry::recall(const WheelMemory& memory) {
+void WheelOdometry::restore(const WheelMemory& memory) {
   const bool sane =
       memory.gyro_bias.allFinite() && memory.gyro_bias_sigma.allFinite() && memory.gyro_bias_sigma.minCoeff() >= 0.0;
   if (started_ || !sane) return;
   const double spread = config_.sensors.gyro_bias_std, change = kTurnOnChange * spread;
-  recalled_ = true;
-  known_.gyro_bias = memory.gyro_bias;
+  restored_ = true;
+  prior_.gyro_bias = memory.gyro_bias;
   for (int i = 0; i < 3; ++i)
-    known_.gyro_bias_sigma(i) = std::min(spread, std::hypot(memory.gyro_bias_sigma(i), change));
+    prior_.gyro_bias_sigma(i) = std::min(spread, std::hypot(memory.gyro_bias_sigma(i), change));
 }
 
 template <class Self, class Visitor>
@@ -124,14 +127,14 @@ void WheelOdometry::visit_members(Self& self, const Visitor& visit) {
   visit(self.raw_speed_, self.smallest_change_, self.num_changes_);
   visit(self.last_speed_, self.forward_acceleration_, self.wheel_yaw_rate_, self.gyro_);
   visit(self.gyro_yaw_, self.yaw_known_, self.slip_since_us_);
-  visit(self.standing_.quiet_since_us, self.standing_.slow_gyro, self.standing_.quiet_gyro, self.standing_.standing,
-        self.turns_standing_, self.bias_judged_);
+  visit(self.standstill_.still_since_us, self.standstill_.filtered_gyro, self.standstill_.reference_gyro,
+        self.standstill_.standing, self.turning_at_standstill_, self.bias_tested_);
   visit(self.direction_.sign, self.direction_.assumed, self.direction_.undecided_since_us);
-  visit(self.plumb_force_, self.plumb_gyro_, self.plumb_time_, self.plumb_begin_us_, self.plumb_begin_speed_,
-        self.plumb_begin_gyro_);
+  visit(self.levelling_force_, self.levelling_gyro_, self.levelling_time_, self.levelling_begin_us_,
+        self.levelling_begin_speed_, self.levelling_begin_gyro_);
   visit(self.align_force_, self.align_time_, self.block_gyro_, self.block_time_);
   visit(self.mag_us_, self.mag_strength_, self.mag_dip_, self.reset_counter_);
-  visit(self.recalled_, self.known_.gyro_bias, self.known_.gyro_bias_sigma);
+  visit(self.restored_, self.prior_.gyro_bias, self.prior_.gyro_bias_sigma);
 }
 
 void WheelOdometry::save(StateWriter& writer) const {

@@ -6,7 +6,7 @@
 
 namespace roadfix {
 
-using namespace wheel;  // the names of the error state
+using namespace wheel;  // indices of the error state
 
 double WheelState::sigma(int index) const { return std::sqrt(P(index, index)); }
 

@@ -7,22 +7,22 @@
 
 namespace roadfix {
 
-/// Order of the error state. From kGyroBias on: parameters; of them only the gyro biases are estimated (standing), and
-/// the magnetic offset; the others are considered: they never change, but their uncertainty counts.
+/// Order of the error state. From kGyroBias on: parameters. The gyro biases (at standstill) and the magnetic offset are
+/// estimated; the others are considered (Schmidt): not corrected, but their covariance is propagated.
 namespace wheel {
 enum ErrorIndex {
-  kPos = 0,          ///< m, in the level frame
-  kYaw = 3,          ///< rad
-  kRoll = 4,         ///< rad
-  kPitch = 5,        ///< rad
-  kSpeed = 6,        ///< m/s, along the direction of travel
-  kGyroBias = 7,     ///< rad/s
-  kAccelBias = 10,   ///< m/s2, x and y
-  kWheelScale = 12,  ///< true speed / measured speed - 1
-  kSide = 13,        ///< rad, direction of travel to the left of the imu's x
-  kClimb = 14,       ///< rad, direction of travel below the imu's x
-  kGyroScale = 15,   ///< measured rate / true rate - 1, z axis
-  kMagOffset = 16,   ///< rad, magnetic yaw minus yaw
+  kPos = 0,             ///< m, in the level frame
+  kYaw = 3,             ///< rad
+  kRoll = 4,            ///< rad
+  kPitch = 5,           ///< rad
+  kSpeed = 6,           ///< m/s, along the direction of travel
+  kGyroBias = 7,        ///< rad/s
+  kAccelBias = 10,      ///< m/s2, x and y
+  kWheelScale = 12,     ///< true speed / measured speed - 1
+  kMountingYaw = 13,    ///< rad, direction of travel to the left of the IMU's x
+  kMountingPitch = 14,  ///< rad, direction of travel below the IMU's x
+  kGyroScale = 15,      ///< measured rate / true rate - 1, z axis
+  kMagOffset = 16,      ///< rad, magnetic yaw minus yaw
   kWheelStates = 17
 };
 }  // namespace wheel
@@ -38,12 +38,12 @@ struct WheelState {
   [[nodiscard]] double sigma(int index) const;
 };
 
-/// Sets one component's error to be independent of all others, with the given standard deviation.
+/// Removes the correlations of one error component and sets its standard deviation.
 void decouple(WheelCovariance& P, int index, double sigma);
 
-/// Fuses the scalar z = h(x) + noise of the given variance: innovation = z - h(x), H its row. Only the components in
-/// `corrected` change; the others are considered (Schmidt, Application of state-space methods to navigation problems,
-/// 1966), and P stays honest for that (Joseph's form), (M.26).
+/// Scalar Schmidt-Kalman update with z = h(x) + noise: innovation = z - h(x), H its row. Only the components in
+/// `corrected` are estimated, the others considered (Schmidt 1966, Application of state-space methods to navigation
+/// problems); covariance in Joseph's form, (W.6.1).
 void schmidt_update(WheelState& state, const WheelVector& H, double innovation, double variance,
                     std::initializer_list<int> corrected);
 

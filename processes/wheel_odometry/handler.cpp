@@ -69,18 +69,18 @@ class WheelOdometryStage final : public Stage {
   [[nodiscard]] const StageSpec& spec() const override { return spec_; }
 
   void apply(const Message& message) override {
-    if (message.input == kStart) return recall(decode<state_t>(message.bytes).state);
-    while (!ahead_.empty() && ahead_.front().utime <= message.utime) ahead_.pop_front();
+    if (message.input == kStart) return restore(decode<state_t>(message.bytes).state);
+    while (!pending_.empty() && pending_.front().utime <= message.utime) pending_.pop_front();
     add(odometry_, sample_of(message));
   }
 
-  void on_clock(const Message& message) override { ahead_.push_back({message.utime, sample_of(message)}); }
+  void on_clock(const Message& message) override { pending_.push_back({message.utime, sample_of(message)}); }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
     if (!slot_.due(now_utime)) return;
     WheelOdometry now = odometry_;
-    for (const Ahead& a : ahead_) add(now, a.sample);
-    now.carry_to(now_utime);
+    for (const PendingSample& a : pending_) add(now, a.sample);
+    now.extrapolate_to(now_utime);
     const WheelReport report = now.report();
     pose_t pose{};
     fill_pose(now.odometry(), pose);
@@ -114,7 +114,7 @@ class WheelOdometryStage final : public Stage {
     reader.finish();
     odometry_ = loaded;
     slot_.set_last(slot);
-    ahead_.clear();
+    pending_.clear();
   }
 
   [[nodiscard]] std::vector<uint8_t> memory() const override {
@@ -131,18 +131,18 @@ class WheelOdometryStage final : public Stage {
 
  private:
   /// A clock sample that the horizon has not reached.
-  struct Ahead {
+  struct PendingSample {
     int64_t utime = 0;
     Sample sample;
   };
 
-  void recall(const std::vector<uint8_t>& bytes) {
+  void restore(const std::vector<uint8_t>& bytes) {
     WheelMemory memory;
     if (bytes.size() != 6 * sizeof(double)) return;  // written by another version
     StateReader reader(bytes);
     reader.get(memory.gyro_bias);
     reader.get(memory.gyro_bias_sigma);
-    odometry_.recall(memory);
+    odometry_.restore(memory);
   }
 
   static void add(WheelOdometry& odometry, const Sample& sample) {
@@ -155,7 +155,7 @@ class WheelOdometryStage final : public Stage {
   PublishSlot slot_;
   StageSpec spec_;
   WheelOdometry odometry_;  ///< at the horizon
-  std::deque<Ahead> ahead_;
+  std::deque<PendingSample> pending_;
 };
 
 /// Random walk that a Gauss-Markov process is over times short against its correlation.
@@ -189,8 +189,8 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
     take_known(mag->soft_iron, s.soft_iron);
   }
   const Eigen::Vector3d forward = calibration.forward_in_body();
-  s.side = std::atan2(forward.y(), forward.x());
-  s.climb = std::asin(-forward.z());
+  s.mounting_yaw = std::atan2(forward.y(), forward.x());
+  s.mounting_pitch = std::asin(-forward.z());
   if (calibration.mounting && calibration.mounting->std_deg) s.mounting_std = kDegree * *calibration.mounting->std_deg;
   return s;
 }

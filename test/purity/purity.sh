@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Greps ROOT for what DESIGN.md (sections 3 and 5) and STYLE.md (section 8) forbid; prints each breach and fails with their number.
+# Greps ROOT for what DESIGN.md (sections 3 and 5) and STYLE.md (sections 4 and 8) forbid; prints each breach and fails with their number.
 #   purity.sh ROOT
 set -uo pipefail
 cd "$1" || exit 2
@@ -47,6 +47,25 @@ report 'one name, one type' < <(find lib processes test \( -name '*.h' -o -name 
     for (i = depth; i > 0; i--) name = space[i] "::" name
     if (name in first) print FILENAME ":" FNR ": " name ", also in " first[name]; else first[name] = FILENAME
   }')
+
+# Equations are numbered (X.section.n), X the letter of the library, in order; what the code cites is in its MODEL.md.
+numbering=(wheel:W)
+for entry in "${numbering[@]}"; do
+  library=${entry%:*} letter=${entry#*:} model=lib/${entry%:*}/MODEL.md
+  [[ -f $model ]] || continue
+  # A number at the end of a line defines an equation; anywhere else it cites one.
+  report 'equations are numbered in order, by section' < <(awk -v file="$model" -v letter="$letter" '
+    /^## [0-9]+\./ { section = $2 + 0; last = 0; next }
+    match($0, "\\(" letter "\\.[0-9]+\\.[0-9]+\\)$") && /^    / {
+      split(substr($0, RSTART + 1, RLENGTH - 2), part, ".")
+      if (part[2] != section || part[3] != last + 1) print file ":" FNR ":" $0
+      last = part[3]
+    }' "$model")
+  report 'a cited equation is in MODEL.md' < <(grep -rnoE --include='*.h' --include='*.cpp' --include='*.md' "\\($letter\\.[0-9]+\\.[0-9]+\\)" \
+    lib/"$library" test/unit/"$library" 2>/dev/null | while IFS=: read -r file number cited; do
+      grep -qE "^    .*\\(${cited:1:-1}\\)\$" "$model" || printf '%s:%s:%s\n' "$file" "$number" "$cited"
+    done)
+done
 
 if [[ $breaches -gt 0 ]]; then echo "$breaches breaches"; exit 1; fi
 echo "pure"

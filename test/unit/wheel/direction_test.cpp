@@ -8,14 +8,14 @@ namespace {
 
 constexpr DirectionLimits kLimits{6.0, 3.0};
 
-/// After one magnitude.
+/// State after one magnitude.
 int sign_after(double magnitude, double predicted, double variance) {
   DirectionState d;
-  add_magnitude(d, kLimits, 0, magnitude, predicted, variance);
+  update_direction(d, kLimits, 0, magnitude, predicted, variance);
   return d.sign;
 }
 
-TEST_CASE("the sign of a magnitude is decided by the likelihoods of both") {
+TEST_CASE("the sign of a speed magnitude follows the likelihood ratio") {
   for (const double magnitude : {0.4, 3.0}) {
     for (const double variance : {0.1, 2.0}) {
       const auto likelihood = [&](double speed, double predicted) {
@@ -30,21 +30,21 @@ TEST_CASE("the sign of a magnitude is decided by the likelihoods of both") {
   }
 }
 
-TEST_CASE("a car that nothing tells the direction of is taken to go forward, and it is said") {
+TEST_CASE("without evidence forward is assumed and reported") {
   DirectionState d;
-  for (const double t_s : {0.0, 2.9}) add_magnitude(d, kLimits, std::llround(1e6 * t_s), 5.0, 0.0, 1.0);
+  for (const double t_s : {0.0, 2.9}) update_direction(d, kLimits, std::llround(1e6 * t_s), 5.0, 0.0, 1.0);
   CHECK(d.sign == 0);
-  add_magnitude(d, kLimits, 3'100'000, 5.0, 0.0, 1.0);
+  update_direction(d, kLimits, 3'100'000, 5.0, 0.0, 1.0);
   CHECK(d.sign == 1);
   CHECK(d.assumed);
 }
 
-TEST_CASE("only a slow car changes its sign") {
-  for (const double magnitude : {0.9 * kReversible, 1.1 * kReversible}) {
+TEST_CASE("the sign changes only at low speed") {
+  for (const double magnitude : {0.9 * kMaxReversalSpeed, 1.1 * kMaxReversalSpeed}) {
     DirectionState d{1, true, {}};
-    add_magnitude(d, kLimits, 0, magnitude, -10.0, 0.1);
-    CHECK(d.sign == (magnitude < kReversible ? -1 : 1));
-    CHECK(d.assumed == (magnitude >= kReversible));
+    update_direction(d, kLimits, 0, magnitude, -10.0, 0.1);
+    CHECK(d.sign == (magnitude < kMaxReversalSpeed ? -1 : 1));
+    CHECK(d.assumed == (magnitude >= kMaxReversalSpeed));
   }
 }
 

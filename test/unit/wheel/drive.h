@@ -9,16 +9,16 @@
 
 namespace roadfix::test {
 
-/// The filter's knowledge of the simulated sensors: exactly the simulation's own figures.
+/// Sensor parameters of the filter, equal to those of the simulation.
 WheelConfig matching_config(const ScenarioConfig& scenario);
 
-/// Called after each imu sample (without imu: wheel sample) once the odometry has started.
+/// Called after each IMU sample (without IMU: wheel sample) once the odometry has started.
 using OnPose = std::function<void(const WheelOdometry&)>;
 
 /// Feeds imu, wheels and mag in the order of their times.
 void run(const SimulatedDrive& drive, WheelOdometry& odometry, const OnPose& on_pose);
 
-/// Truth seen from the level frame of the odometry's first pose.
+/// Ground truth in the level frame of the odometry's first pose.
 class LevelTruth {
  public:
   explicit LevelTruth(const SimulatedDrive& drive) : drive_(drive) {}
@@ -35,7 +35,7 @@ class LevelTruth {
   std::optional<SE3> T_level_enu_;
 };
 
-/// Errors at the drive's end.
+/// Errors at the end of the drive.
 struct EndError {
   Vector6d error = Vector6d::Zero();
   Matrix6d cov = Matrix6d::Zero();

@@ -8,7 +8,7 @@
 
 namespace roadfix {
 
-using namespace wheel;  // the names of the error state
+using namespace wheel;  // indices of the error state
 namespace {
 
 double draw(std::mt19937_64& generator, double size) { return std::normal_distribution<double>(0.0, size)(generator); }
@@ -42,14 +42,14 @@ TEST_CASE("Jacobian of the propagation in all its forms") {
     CHECK((transition(x, step) - numerical_transition(x, step)).cwiseAbs().maxCoeff() < 1e-7);
     step.form = StepForm::kEuler;
     CHECK((transition(x, step) - numerical_transition(x, step)).cwiseAbs().maxCoeff() < 1e-7);
-    step.blind_acceleration = 0.7;
+    step.assumed_acceleration = 0.7;
     CHECK((transition(x, step) - numerical_transition(x, step)).cwiseAbs().maxCoeff() < 1e-7);
     step.standing = true;
     CHECK((transition(x, step) - numerical_transition(x, step)).cwiseAbs().maxCoeff() < 1e-7);
   }
 }
 
-TEST_CASE("biases walk, each by what is known of its own; scales and angles of mounting do not") {
+TEST_CASE("biases follow their own random walks; scales and mounting angles are constant") {
   WheelNoise noise;
   noise.gyro_walk = 1e-3;
   noise.accel_walk = 2e-2;
@@ -60,25 +60,26 @@ TEST_CASE("biases walk, each by what is known of its own; scales and angles of m
   propagate(state, step, noise);
   for (int i = 0; i < 3; ++i) CHECK(state.P(kGyroBias + i, kGyroBias + i) == Approx(1e-6 * step.dt));
   for (int i = 0; i < 2; ++i) CHECK(state.P(kAccelBias + i, kAccelBias + i) == Approx(4e-4 * step.dt));
-  for (const int i : {int{kWheelScale}, int{kSide}, int{kClimb}, int{kGyroScale}}) CHECK(state.P(i, i) == 0.0);
+  for (const int i : {int{kWheelScale}, int{kMountingYaw}, int{kMountingPitch}, int{kGyroScale}})
+    CHECK(state.P(i, i) == 0.0);
 }
 
-TEST_CASE("Jacobian of the levelling, corrected and plain") {
+TEST_CASE("Jacobian of the tilt correction, with and without vehicle acceleration") {
   std::mt19937_64 generator(44);
   for (int i = 0; i < 21; ++i) {
     const WheelVector x = i == 0 ? WheelVector::Zero().eval() : random_state(generator);
     const WheelStep step = random_step(generator);
-    PlumbLine plumb{step.accel, step.gyro, draw(generator, 1.0), true, 0.1};
+    GravityMeasurement gravity{step.accel, step.gyro, draw(generator, 1.0), true, 0.1};
     for (const bool correct : {true, false}) {
-      plumb.correct_acceleration = correct;
-      const auto f = [&](const WheelVector& d) { return levelled_mean(x + d, plumb); };
+      gravity.correct_acceleration = correct;
+      const auto f = [&](const WheelVector& d) { return levelled_mean(x + d, gravity); };
       const WheelCovariance numerical = test::numerical_jacobian<kWheelStates, kWheelStates>(f, 1e-5);
-      CHECK((levelling(x, plumb) - numerical).cwiseAbs().maxCoeff() < 1e-7);
+      CHECK((levelling_jacobian(x, gravity) - numerical).cwiseAbs().maxCoeff() < 1e-7);
     }
   }
 }
 
-TEST_CASE("the Jacobian's test has teeth: a wrong sign is seen") {
+TEST_CASE("the Jacobian test detects a wrong sign") {
   std::mt19937_64 generator(42);
   const WheelVector x = random_state(generator);
   const WheelStep step = random_step(generator);
@@ -87,11 +88,11 @@ TEST_CASE("the Jacobian's test has teeth: a wrong sign is seen") {
   CHECK((F - numerical_transition(x, step)).cwiseAbs().maxCoeff() > 1e-3);
 }
 
-TEST_CASE("speed noise without an accelerometer is that of integrated white noise") {
+TEST_CASE("speed noise without an accelerometer equals integrated white noise") {
   WheelState state;
   state.x(kSpeed) = 10.0;
   WheelStep step;
-  step.blind_acceleration = 0.0;
+  step.assumed_acceleration = 0.0;
   step.dt = 0.1;
   WheelNoise noise;
   noise.accel = 2.0;
@@ -101,7 +102,7 @@ TEST_CASE("speed noise without an accelerometer is that of integrated white nois
   CHECK(state.P(kPos, kPos) == Approx(4.0 / 3.0));
 }
 
-TEST_CASE("a considered update leaves the rest and its covariance is Joseph's") {
+TEST_CASE("a Schmidt update leaves considered states unchanged; its covariance equals Joseph's form") {
   std::mt19937_64 generator(43);
   WheelCovariance A;
   for (int i = 0; i < kWheelStates * kWheelStates; ++i) A(i) = draw(generator, 0.1);

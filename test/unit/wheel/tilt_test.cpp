@@ -7,7 +7,7 @@
 #include "geometry/frames.h"
 #include "geometry/so3.h"
 #include "support/numerical_jacobian.h"
-#include "wheel/travel.h"
+#include "wheel/axle_motion.h"
 
 namespace roadfix {
 namespace {
@@ -24,7 +24,7 @@ Eigen::Vector3d random_vector(std::mt19937_64& generator, double size) {
   return {x, y, z};
 }
 
-TEST_CASE("gravity gives back roll and pitch at any tilt") {
+TEST_CASE("roll and pitch are recovered from gravity at any tilt") {
   for (double roll = -1.2; roll <= 1.2; roll += 0.3) {
     for (double pitch = -1.2; pitch <= 1.2; pitch += 0.3) {
       const Tilt tilt = tilt_of_gravity(felt_gravity({roll, pitch}));
@@ -34,7 +34,7 @@ TEST_CASE("gravity gives back roll and pitch at any tilt") {
   }
 }
 
-TEST_CASE("the printed angles exchange the axes: rolling moves the printed pitch") {
+TEST_CASE("the printed angles exchange the axes: roll changes the printed pitch") {
   const double angle = 5.0 * kDegree;
   const Tilt rolled = printed_tilt(felt_gravity({angle, 0.0}));
   CHECK(rolled.roll == Approx(0.0).margin(1e-12));
@@ -42,13 +42,13 @@ TEST_CASE("the printed angles exchange the axes: rolling moves the printed pitch
   const Tilt nose_up = printed_tilt(felt_gravity({0.0, -angle}));
   CHECK(nose_up.roll == Approx(angle));
   CHECK(nose_up.pitch == Approx(0.0).margin(1e-12));
-  // Even with the names exchanged it is the axis' angle to the horizontal, not roll, once both are tilted.
+  // Even with the axes exchanged it is the axis' angle to the horizontal, not roll, once both angles are non-zero.
   const Tilt both = printed_tilt(felt_gravity({30.0 * kDegree, 30.0 * kDegree}));
   CHECK(std::abs(both.pitch - 30.0 * kDegree) > 4.0 * kDegree);
 }
 
-TEST_CASE("the wheels' acceleration is that of a body on a curve") {
-  // Numerically: p(t) of a car on a level circle with growing speed, differentiated twice, against (M.2).
+TEST_CASE("the axle acceleration equals the second derivative of a curved path") {
+  // Numerically: p(t) of a car on a level circle with growing speed, differentiated twice, against (W.1.2).
   const double speed = 12.0, speed_rate = 1.5, curvature = 0.05;
   const auto position = [&](double t) {
     const double s = speed * t + 0.5 * speed_rate * t * t;
@@ -57,13 +57,13 @@ TEST_CASE("the wheels' acceleration is that of a body on a curve") {
   const double h = 1e-3;
   const Eigen::Vector3d numerical = (position(h) - 2.0 * position(0.0) + position(-h)) / (h * h);
   const Eigen::Vector3d predicted =
-      wheel_acceleration(speed, speed_rate, {0.0, 0.0, curvature * speed}, Eigen::Vector3d::UnitX());
+      axle_acceleration(speed, speed_rate, {0.0, 0.0, curvature * speed}, Eigen::Vector3d::UnitX());
   CHECK((numerical - predicted).norm() < 1e-3);
-  CHECK((numerical - wheel_acceleration(speed, speed_rate, {0.0, 0.0, -curvature * speed}, Eigen::Vector3d::UnitX()))
+  CHECK((numerical - axle_acceleration(speed, speed_rate, {0.0, 0.0, -curvature * speed}, Eigen::Vector3d::UnitX()))
             .norm() > 1.0);
 }
 
-TEST_CASE("Euler rates are those of the rotation") {
+TEST_CASE("Euler rates equal the derivative of the rotation") {
   std::mt19937_64 generator(11);
   for (int i = 0; i < 20; ++i) {
     const Eigen::Vector3d a = random_vector(generator, 0.4), omega = random_vector(generator, 1.0);
@@ -94,26 +94,26 @@ TEST_CASE("Jacobians of the tilt and of the Euler rates") {
   }
 }
 
-/// Runs the filter for 30 s of braking at 2 m/s2 from a standstill's tilt of zero and returns its largest pitch.
+/// Runs the filter for 30 s of braking at 2 m/s2 from zero tilt and returns its largest pitch.
 double pitch_while_braking(bool corrected, double rate_hz) {
   Tilt tilt;
   double largest = 0.0;
   const Eigen::Vector3d f(-2.0, 0.0, kGravity);
   for (int i = 0; i < static_cast<int>(30.0 * rate_hz); ++i) {
     const Eigen::Vector3d felt =
-        corrected ? Eigen::Vector3d(f - wheel_acceleration(10.0, -2.0, {0.0, 0.0, 0.0}, Eigen::Vector3d::UnitX())) : f;
+        corrected ? Eigen::Vector3d(f - axle_acceleration(10.0, -2.0, {0.0, 0.0, 0.0}, Eigen::Vector3d::UnitX())) : f;
     tilt = blend(tilt, tilt_of_gravity(felt), accelerometer_share(1.0 / rate_hz, 3.0));
     largest = std::max(largest, std::abs(tilt.pitch));
   }
   return largest;
 }
 
-TEST_CASE("braking tilts the plain filter and not the corrected one") {
+TEST_CASE("braking biases the pitch of the uncorrected filter only") {
   CHECK(pitch_while_braking(false, 100.0) == Approx(std::atan2(2.0, kGravity)).epsilon(1e-3));
   CHECK(pitch_while_braking(true, 100.0) == Approx(0.0).margin(1e-12));
 }
 
-TEST_CASE("the filter's corner does not move with the sample rate") {
+TEST_CASE("the filter's corner frequency does not depend on the sample rate") {
   const auto after_three_seconds = [](double rate_hz) {
     Tilt tilt;
     for (int i = 0; i < static_cast<int>(3.0 * rate_hz); ++i)
@@ -125,7 +125,7 @@ TEST_CASE("the filter's corner does not move with the sample rate") {
   CHECK(after_three_seconds(50.0) == Approx(share_left).epsilon(1e-2));
 }
 
-TEST_CASE("a blend across the cut of the circle takes the short way") {
+TEST_CASE("blending across +-pi follows the shorter arc") {
   const Tilt tilt = blend({kPi - 0.1, 0.0}, {-kPi + 0.1, 0.0}, 0.5);
   CHECK(std::abs(wrap_angle(tilt.roll - kPi)) < 1e-12);
 }

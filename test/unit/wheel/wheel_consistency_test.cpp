@@ -1,4 +1,4 @@
-/// Honest covariance over 50 simulated drives, with siblings that must fail.
+/// Covariance consistency over 50 simulated drives, with siblings that must fail.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
@@ -14,21 +14,21 @@ namespace {
 constexpr int kSeeds = 50;
 
 struct Nees {
-  double pose = 0.0;  ///< mean normalised square over its degrees of freedom
+  double pose = 0.0;  ///< mean normalised error squared over its degrees of freedom
   double speed = 0.0;
   double median_error = 0.0;  ///< m, horizontal
   double median_sigma = 0.0;  ///< m
 };
 
-/// `tell` what is known of each drive.
-using Tell = std::function<void(const SimulatedDrive&, WheelSensors&)>;
+/// `calibrate` sets the calibration of each drive.
+using Calibrate = std::function<void(const SimulatedDrive&, WheelSensors&)>;
 
-Nees nees(const ScenarioConfig& simulated, WheelConfig config, const Tell& tell = {}) {
+Nees nees(const ScenarioConfig& simulated, WheelConfig config, const Calibrate& calibrate = {}) {
   ConsistencyAccumulator pose, speed;
   std::vector<double> errors, sigmas;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const SimulatedDrive drive = simulate(simulated, seed);
-    if (tell) tell(drive, config.sensors);
+    if (calibrate) calibrate(drive, config.sensors);
     const test::EndError end = test::end_error(drive, config);
     pose.add(normalised_square(end.error, end.cov).value(), 6);
     speed.add(end.velocity_error.x() * end.velocity_error.x() / end.cov_velocity(0, 0), 1);
@@ -49,7 +49,7 @@ ScenarioConfig city() {
   return s;
 }
 
-TEST_CASE("the pose's covariance is what its errors are") {
+TEST_CASE("pose NEES over 50 drives is consistent") {
   const Nees n = nees(city(), test::matching_config(city()));
   const Band band = chi_square_band(kSeeds, 6);
   CHECK(band.holds(n.pose));
@@ -57,7 +57,7 @@ TEST_CASE("the pose's covariance is what its errors are") {
   CHECK(n.speed > 0.4);
 }
 
-TEST_CASE("also with noise that the filter was not told: times 1.5") {
+TEST_CASE("pose NEES is consistent with sensor noise times 1.5") {
   ScenarioConfig louder = city();
   louder.imu.gyro_noise_radps_per_rthz *= 1.5;
   louder.imu.accel_noise_mps2_per_rthz *= 1.5;
@@ -72,40 +72,40 @@ ScenarioConfig askew() {
   return s;
 }
 
-TEST_CASE("an IMU askew and off the axle, as the calibration tells, is as good as one in its place") {
-  const auto tell = [](const SimulatedDrive& drive, WheelSensors& s) {
+TEST_CASE("a calibrated IMU misalignment and lever arm give the accuracy of a mounted-at-axle IMU") {
+  const auto calibrate = [](const SimulatedDrive& drive, WheelSensors& s) {
     const Eigen::Quaterniond q_imu_vehicle = drive.errors.q_vehicle_imu.conjugate();
     const Eigen::Vector3d forward = q_imu_vehicle * Eigen::Vector3d::UnitX();
-    s.side = std::atan2(forward.y(), forward.x());
-    s.climb = std::asin(-forward.z());
+    s.mounting_yaw = std::atan2(forward.y(), forward.x());
+    s.mounting_pitch = std::asin(-forward.z());
     s.p_imu_axle = -(q_imu_vehicle * drive.config.imu.position_m);
   };
-  const Nees n = nees(askew(), test::matching_config(city()), tell);
+  const Nees n = nees(askew(), test::matching_config(city()), calibrate);
   CHECK(chi_square_band(kSeeds, 6).holds(n.pose));
   CHECK(n.median_error < 6.5);
-  // Teeth: in its place is what it is not.
+  // Teeth: misalignment and lever arm ignored.
   CHECK(nees(askew(), test::matching_config(city())).pose > 100.0);
 }
 
-TEST_CASE("an IMU askew and off the axle is honest where the calibration tells how far it may be") {
+TEST_CASE("an uncalibrated misalignment within its stated sigma is consistent") {
   WheelConfig config = test::matching_config(askew());
   config.sensors.p_imu_axle_std = {1.0, 0.5, 0.5};
   const double pose = nees(askew(), config).pose;
   CHECK(pose < chi_square_band(kSeeds, 6).high);
   CHECK(pose > 0.7);
-  // Teeth: a third of how far.
+  // Teeth: a third of the sigma.
   config.sensors.mounting_std *= 0.3;
   config.sensors.p_imu_axle_std *= 0.3;
   CHECK(nees(askew(), config).pose > chi_square_band(kSeeds, 6).high);
 }
 
-TEST_CASE("teeth: an overconfident scale fails") {
+TEST_CASE("teeth: an overconfident wheel scale fails") {
   WheelConfig config = test::matching_config(city());
   config.sensors.wheel_scale_std *= 0.5;
   CHECK(nees(city(), config).pose > chi_square_band(kSeeds, 6).high);
 }
 
-TEST_CASE("teeth: a gyro that is called four times too good fails") {
+TEST_CASE("teeth: a gyro noise understated four times fails") {
   WheelConfig config = test::matching_config(city());
   config.sensors.gyro_noise *= 0.25;
   config.sensors.gyro_scale_std *= 0.25;
@@ -113,12 +113,12 @@ TEST_CASE("teeth: a gyro that is called four times too good fails") {
   CHECK(nees(city(), config).pose > chi_square_band(kSeeds, 6).high);
 }
 
-TEST_CASE("teeth: a timid filter fails from below") {
+TEST_CASE("teeth: an underconfident filter fails at the lower bound") {
   WheelConfig config = test::matching_config(city());
   config.sensors.wheel_scale_std *= 3.0;
   config.sensors.accel_bias_std *= 3.0;
   config.sensors.gyro_scale_std *= 3.0;
-  config.tuning.side_noise *= 3.0;
+  config.tuning.sideslip_noise *= 3.0;
   CHECK(nees(city(), config).pose < chi_square_band(kSeeds, 6).low);
 }
 

@@ -28,7 +28,7 @@ TEST_CASE("four wheels give speed and yaw rate of the rear axle") {
   }
 }
 
-TEST_CASE("the paper's sides fit a skid-steered robot and not a car") {
+TEST_CASE("the mean of front and rear wheels fits a skid-steered robot, not a car") {
   WheelSample robot = car(2.0, 0.8);
   robot.speeds[0] = robot.speeds[2];
   robot.speeds[1] = robot.speeds[3];
@@ -38,7 +38,7 @@ TEST_CASE("the paper's sides fit a skid-steered robot and not a car") {
   CHECK(wheel_motion(car(2.0, 0.8), kTrack, SideRule::kMeanOfFrontAndRear).speed > 2.2);
 }
 
-TEST_CASE("magnitudes in reverse gear: speed and yaw rate of the sides change sign") {
+TEST_CASE("reverse gear with magnitudes negates speed and yaw rate") {
   WheelSample w = car(-4.0, 0.3);
   for (double& s : w.speeds) s = std::abs(s);
   w.direction = WheelDirection::kReverse;
@@ -49,7 +49,7 @@ TEST_CASE("magnitudes in reverse gear: speed and yaw rate of the sides change si
   CHECK(!wheel_motion(w, kTrack, SideRule::kRearAxle).sides_yaw_rate);
 }
 
-TEST_CASE("one speed has no yaw rate but that of the car's own sensor") {
+TEST_CASE("a single speed has only the yaw rate of the vehicle's own sensor") {
   WheelSample w;
   w.speeds[0] = 5.0;
   CHECK(!wheel_motion(w, kTrack, SideRule::kRearAxle).sides_yaw_rate);
@@ -58,11 +58,11 @@ TEST_CASE("one speed has no yaw rate but that of the car's own sensor") {
   CHECK(*wheel_motion(w, kTrack, SideRule::kRearAxle).sensor_yaw_rate == 0.2);
 }
 
-TEST_CASE("no track width, no yaw rate from the sides") {
+TEST_CASE("without track width there is no yaw rate from the wheels") {
   CHECK(!wheel_motion(car(5.0, 0.1), std::nullopt, SideRule::kRearAxle).sides_yaw_rate);
 }
 
-TEST_CASE("encoder ticks become a rim speed by the radius") {
+TEST_CASE("encoder ticks and wheel radius give the circumferential speed") {
   CHECK(rim_speed(100, 100.0, 0.3, 0.5) == Approx(2.0 * 3.14159265358979 * 0.3 / 0.5));
 }
 

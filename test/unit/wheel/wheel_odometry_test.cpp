@@ -11,7 +11,7 @@
 
 namespace roadfix {
 
-using namespace wheel;  // the names of the error state
+using namespace wheel;  // indices of the error state
 namespace {
 
 using test::LevelTruth;
@@ -34,7 +34,7 @@ ScenarioConfig perfect(ScenarioConfig s) {
   return s;
 }
 
-/// The odometry leaves the Earth's rate in the gyro's bias; here it would hide what the test looks for.
+/// The odometry estimates the Earth's rate as gyro bias; here it would hide the effect under test.
 void remove_earth_rate(SimulatedDrive& drive) {
   for (ImuSample& imu : drive.imu)
     imu.gyro -= drive.truth_at(imu.t_us).T_frame_vehicle.q.conjugate() * earth_rate_enu(drive.anchor);
@@ -47,7 +47,7 @@ double distance_driven(const SimulatedDrive& drive) {
   return d;
 }
 
-TEST_CASE("perfect sensors bring the car back to a thousandth of the way") {
+TEST_CASE("ideal sensors: position error below 0.1 % of the distance") {
   for (const char* name : {"city_loop", "car_park"}) {
     const ScenarioConfig s = perfect(scenario_of(name, 120.0));
     SimulatedDrive drive = simulate(s, 1);
@@ -60,7 +60,7 @@ TEST_CASE("perfect sensors bring the car back to a thousandth of the way") {
   }
 }
 
-TEST_CASE("plain accelerometer angles tilt with every braking; corrected ones do not") {
+TEST_CASE("uncorrected accelerometer angles tilt under braking; corrected ones do not") {
   const ScenarioConfig s = perfect(scenario_of("city_loop", 90.0));
   const SimulatedDrive drive = simulate(s, 1);
   const auto rms_pitch = [&](bool correct) {
@@ -81,7 +81,7 @@ TEST_CASE("plain accelerometer angles tilt with every braking; corrected ones do
   CHECK(plain > 5.0 * corrected);
 }
 
-TEST_CASE("standing still changes no bit of position and yaw, and learns the gyro's bias") {
+TEST_CASE("standstill: position and yaw are constant to the bit, the gyro bias is estimated") {
   ScenarioConfig s = scenario_of("standing", 60.0);
   s.imu.gyro_bias_std_radps = 0.02;
   const SimulatedDrive drive = simulate(s, 3);
@@ -96,11 +96,11 @@ TEST_CASE("standing still changes no bit of position and yaw, and learns the gyr
   REQUIRE(stood);
   CHECK(stood->x.segment<3>(kPos).norm() < 0.1);
   const Eigen::Vector3d bias_error = odometry.state().x.segment<3>(kGyroBias) - drive.errors.imu_bias.back().gyro;
-  CHECK(bias_error.norm() < 3e-4);  // the Earth's rate, 7e-5, is learnt with it
+  CHECK(bias_error.norm() < 3e-4);  // the Earth's rate, 7e-5, is estimated with the bias
   CHECK(drive.errors.imu_bias.back().gyro.norm() > 5e-3);
 }
 
-/// Wheels at rest under a gyro that says `rate` about z for `duration_s`; gyro_bias_std as the calibration has it.
+/// Wheels at rest while the gyro measures `rate` about z for `duration_s`; gyro_bias_std as calibrated.
 WheelState turned_on_the_spot(double rate, double gyro_bias_std, double duration_s) {
   WheelConfig config;
   config.sensors.gyro_bias_std = gyro_bias_std;
@@ -120,20 +120,20 @@ WheelState turned_on_the_spot(double rate, double gyro_bias_std, double duration
   return odometry.state();
 }
 
-TEST_CASE("a rate that the gyro's bias cannot be is turning, though the wheels stand") {
+TEST_CASE("a rate beyond the plausible gyro bias is turning, although the wheels stand") {
   const double rate = 7.6e-4;
   const WheelState turned = turned_on_the_spot(rate, 1.2e-4, 35.0);
   CHECK(turned.x(kYaw) == Approx(rate * 33.0).margin(rate * 2.0));
   CHECK(std::abs(turned.x(kGyroBias + 2)) < 1e-5);
   CHECK(turned.sigma(kGyroBias + 2) > 1e-4);
   CHECK(turned.x.segment<3>(kPos).norm() < 1e-9);
-  // One that it can be is its bias, and the car has not turned.
+  // A plausible rate is the bias, and the yaw is unchanged.
   const WheelState stood = turned_on_the_spot(rate, 5e-3, 35.0);
   CHECK(stood.x(kGyroBias + 2) == Approx(rate).epsilon(0.01));
   CHECK(std::abs(stood.x(kYaw)) < rate * 2.0);
 }
 
-TEST_CASE("reversing: signed, by gear and by magnitude alone all end at one place") {
+TEST_CASE("reversing: signed speed, gear and magnitude give the same end position") {
   for (const WheelSigns signs : {WheelSigns::kSigned, WheelSigns::kGear, WheelSigns::kUnsigned}) {
     ScenarioConfig s = scenario_of("car_park", 120.0);
     s.wheels.signs = signs;
@@ -148,7 +148,7 @@ TEST_CASE("reversing: signed, by gear and by magnitude alone all end at one plac
   }
 }
 
-TEST_CASE("reversing taken for forward ends elsewhere: the test above has teeth") {
+TEST_CASE("teeth: reverse taken for forward ends elsewhere") {
   ScenarioConfig s = scenario_of("car_park", 120.0);
   s.wheels.signs = WheelSigns::kUnsigned;
   SimulatedDrive drive = simulate(s, 5);
@@ -166,7 +166,7 @@ SimulatedDrive slipping_drive(const ScenarioConfig& s) {
   return drive;
 }
 
-TEST_CASE("spinning wheels are flagged, not believed, and widen the covariance") {
+TEST_CASE("wheel spin is rejected, reported and increases the covariance") {
   const ScenarioConfig s = scenario_of("city_loop", 40.0);
   const SimulatedDrive good = simulate(s, 7), bad = slipping_drive(s);
   int slipping = 0;
@@ -191,12 +191,12 @@ TEST_CASE("spinning wheels are flagged, not believed, and widen the covariance")
     return test::end_error(d, config).error.head<2>().norm();
   };
   CHECK(travelled_error(bad, 5.0) < travelled_error(good, 5.0) + 0.5);
-  CHECK(travelled_error(bad, 1000.0) > 4.0);  // believed, the slip is 6 m
+  CHECK(travelled_error(bad, 1000.0) > 4.0);  // used, the slip would be 6 m
 }
 
-TEST_CASE("without imu four wheels carry on alone, and it is said") {
+TEST_CASE("without IMU four wheels propagate alone and report it") {
   ScenarioConfig s = scenario_of("city_loop", 60.0);
-  s.wheels.wheel_scale_std = 1e-4;  // between left and right, a thousandth more is half a radian per minute
+  s.wheels.wheel_scale_std = 1e-4;  // 0.1 % between left and right is half a radian per minute
   SimulatedDrive drive = simulate(s, 9);
   drive.imu.clear();
   WheelConfig config = matching_config(s);
@@ -215,7 +215,7 @@ TEST_CASE("without imu four wheels carry on alone, and it is said") {
   CHECK(error.head<2>().norm() < 3.5 * std::sqrt(end.cov_pose(0, 0) + end.cov_pose(1, 1)));
 }
 
-TEST_CASE("missing inputs are said") {
+TEST_CASE("missing inputs are reported") {
   const ScenarioConfig s = scenario_of("city_loop", 30.0);
   const SimulatedDrive drive = simulate(s, 11);
   WheelOdometry no_wheels(matching_config(s)), outage(matching_config(s)), no_imu(matching_config(s));
@@ -241,7 +241,7 @@ TEST_CASE("missing inputs are said") {
   CHECK(no_imu.report().reason.find("no yaw rate") == 0);
 }
 
-TEST_CASE("bad and repeated samples change nothing") {
+TEST_CASE("invalid and repeated samples change nothing") {
   const ScenarioConfig s = scenario_of("city_loop", 5.0);
   const SimulatedDrive drive = simulate(s, 13);
   WheelOdometry odometry(matching_config(s));
@@ -261,7 +261,7 @@ TEST_CASE("bad and repeated samples change nothing") {
   CHECK(odometry.state().P == before.P);
 }
 
-TEST_CASE("a snapshot continues with the same bits") {
+TEST_CASE("a restored snapshot continues with the same bits") {
   const ScenarioConfig s = scenario_of("city_loop", 30.0);
   const SimulatedDrive drive = simulate(s, 15);
   WheelOdometry whole(matching_config(s));
@@ -287,7 +287,7 @@ TEST_CASE("a snapshot continues with the same bits") {
   CHECK(resumed.state().P == whole.state().P);
 }
 
-TEST_CASE("a start in motion with the bias of the last drive keeps its direction; once started it changes nothing") {
+TEST_CASE("a start in motion uses the gyro bias of the last drive; after the start it has no effect") {
   double with = 0.0, without = 0.0;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const ScenarioConfig s = scenario_of("city_loop", 100.0);
@@ -304,14 +304,14 @@ TEST_CASE("a start in motion with the bias of the last drive keeps its direction
     std::erase_if(rest.mag, [&](const MagSample& x) { return x.t_us < from_us; });
     for (const bool recalls : {false, true}) {
       WheelOdometry odometry(matching_config(s));
-      if (recalls) odometry.recall(*memory);
+      if (recalls) odometry.restore(*memory);
       LevelTruth truth(rest);
       run(rest, odometry, [&](const WheelOdometry& o) {
         if (!truth.started()) truth.start(o.odometry().t_us);
       });
       (recalls ? with : without) += std::abs(truth.error(odometry.odometry())(5));
       const WheelState before = odometry.state();
-      odometry.recall({Eigen::Vector3d::Ones(), Eigen::Vector3d::Ones()});
+      odometry.restore({Eigen::Vector3d::Ones(), Eigen::Vector3d::Ones()});
       CHECK(odometry.state().x == before.x);
     }
   }
@@ -319,7 +319,7 @@ TEST_CASE("a start in motion with the bias of the last drive keeps its direction
   CHECK(with < 0.5 * without);
 }
 
-TEST_CASE("shifting all times shifts the result and no bit of it") {
+TEST_CASE("shifted times give the same bits") {
   const ScenarioConfig s = scenario_of("city_loop", 20.0);
   const SimulatedDrive drive = simulate(s, 17);
   SimulatedDrive shifted = drive;
@@ -334,7 +334,7 @@ TEST_CASE("shifting all times shifts the result and no bit of it") {
   CHECK(a.odometry().t_us + kShift == b.odometry().t_us);
 }
 
-TEST_CASE("the magnetic heading bounds the yaw that a poor gyro loses") {
+TEST_CASE("magnetic heading bounds the yaw drift of a poor gyro") {
   ScenarioConfig s = scenario_of("city_loop", 120.0);
   s.imu.gyro_noise_radps_per_rthz = 5e-3;
   s.mag.hard_iron_std_ut = 0.1;

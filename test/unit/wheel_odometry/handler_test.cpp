@@ -77,7 +77,7 @@ std::vector<std::vector<uint8_t>> run(const std::vector<Arrival>& messages) {
   return sink.poses;
 }
 
-TEST_CASE("the stage publishes poses for now") {
+TEST_CASE("the stage publishes poses at the newest clock sample") {
   const SimulatedDrive d = drive();
   const auto poses = run(arrivals(d, 0));
   REQUIRE(poses.size() > 900);
@@ -91,15 +91,15 @@ TEST_CASE("the stage publishes poses for now") {
   CHECK(!decode<pose_t>(poses.front()).reason.empty());
 }
 
-TEST_CASE("late wheels give the same bits") {
+TEST_CASE("late wheel samples give the same bits") {
   const SimulatedDrive d = drive();
   const auto in_order = run(arrivals(d, 0));
   CHECK(in_order == run(arrivals(d, 45'000)));
   CHECK(in_order == run(arrivals(d, 0)));
-  CHECK(in_order != run(arrivals(d, 200'000)));  // beyond the lateness they are refused, and that shows
+  CHECK(in_order != run(arrivals(d, 200'000)));  // beyond the lateness they are refused and the result differs
 }
 
-TEST_CASE("a snapshot taken on the way goes on with the same bits") {
+TEST_CASE("a snapshot restored mid-drive continues with the same bits") {
   const SimulatedDrive d = drive();
   auto stage = make_wheel_odometry(calibration(), {});
   auto resumed = make_wheel_odometry(calibration(), {});
@@ -122,7 +122,7 @@ TEST_CASE("a snapshot taken on the way goes on with the same bits") {
   CHECK_THROWS(resumed->load(std::vector<uint8_t>{1, 2, 3}));
 }
 
-TEST_CASE("what the calibration says reaches the odometry; what it leaves open keeps the default") {
+TEST_CASE("calibration values reach the odometry; missing ones keep the default") {
   Calibration c = calibration();
   c.sensors.imu = ImuCalibration{};
   c.sensors.imu->gyro_noise = 7e-4;

@@ -1,4 +1,4 @@
-// What the odometry says of its own doubt, against what its configuration says of the sensors.
+// Output covariance against the configured sensor noise.
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -7,7 +7,7 @@
 
 namespace roadfix {
 
-using namespace wheel;  // the names of the error state
+using namespace wheel;  // indices of the error state
 namespace {
 
 using test::matching_config;
@@ -19,7 +19,7 @@ ScenarioConfig tunnel(double duration_s) {
   return s;
 }
 
-TEST_CASE("yaw that the wheels tell in the gyro's place has the wheels' doubt") {
+TEST_CASE("yaw from wheel speeds has the uncertainty of the wheel yaw rate") {
   const ScenarioConfig s = tunnel(40.0);
   SimulatedDrive drive = simulate(s, 9);
   std::erase_if(drive.imu, [&](const ImuSample& imu) { return imu.t_us > s.start_utime + 20'000'000; });
@@ -30,11 +30,11 @@ TEST_CASE("yaw that the wheels tell in the gyro's place has the wheels' doubt") 
     run(drive, odometry, [](const WheelOdometry&) {});
     return odometry.odometry().cov_pose(5, 5);
   };
-  // Of a rate that is wrong alike for twenty seconds, but what the time-out of the gyro takes off them.
+  // Constant yaw rate error over 20 s, less the IMU time-out.
   CHECK(yaw_variance(0.02) - yaw_variance(0.0) == Approx(std::pow(0.02 * 20.0, 2)).epsilon(0.1));
 }
 
-TEST_CASE("the first pose is as level as the accelerometer's noise and bias leave it") {
+TEST_CASE("the initial tilt covariance follows the accelerometer's noise and bias") {
   const ScenarioConfig s = tunnel(5.0);
   const SimulatedDrive drive = simulate(s, 9);
   for (const double bias_std : {0.0, 0.02}) {
@@ -57,12 +57,12 @@ TEST_CASE("the first pose is as level as the accelerometer's noise and bias leav
   }
 }
 
-TEST_CASE("the velocity's covariance across has the wander of its direction over the time of a mean") {
+TEST_CASE("lateral velocity covariance includes the direction noise over the averaging time") {
   const ScenarioConfig s = tunnel(20.0);
   const SimulatedDrive drive = simulate(s, 9);
-  const auto across = [&](double side_noise, double align_time) {
+  const auto across = [&](double sideslip_noise, double align_time) {
     WheelConfig config = matching_config(s);
-    config.tuning.side_noise = side_noise;
+    config.tuning.sideslip_noise = sideslip_noise;
     config.tuning.align_time = align_time;
     WheelOdometry odometry(config);
     run(drive, odometry, [](const WheelOdometry&) {});
