@@ -23,19 +23,20 @@ SeenFrame PictureTracks::track(int64_t t_us, const cv::Mat& left, const cv::Mat&
   TrackDepths::Expected expected;
   if (motion) expected = depths_.expect(left_, *motion, left);
   front_end_->drop(expected.lost);
-  features_ = front_end_->track(left, expected.hints);
-  const std::vector<int64_t> wrong = depths_.learn(left_, motion, features_);
+  std::vector<Feature> features = front_end_->track(left, expected.hints);
+  const std::vector<int64_t> wrong = depths_.learn(left_, motion, features);
   front_end_->drop(wrong);
-  std::erase_if(features_, [&](const Feature& f) { return std::binary_search(wrong.begin(), wrong.end(), f.track); });
+  std::erase_if(features, [&](const Feature& f) { return std::binary_search(wrong.begin(), wrong.end(), f.track); });
   const std::vector<Feature> fresh = front_end_->replenish();
-  features_.insert(features_.end(), fresh.begin(), fresh.end());
-  depths_.keep(left_, features_, left);
+  features.insert(features.end(), fresh.begin(), fresh.end());
+  depths_.keep(left_, features, left);
   last_us_ = t_us;
   SeenFrame frame;
   frame.t_us = t_us;
-  frame.points.reserve(features_.size());
+  frame.points.reserve(features.size());
+  seen_.clear();
   std::vector<StereoQuery> queries;
-  for (const Feature& feature : features_) {
+  for (const Feature& feature : features) {
     const auto ray = left_.unproject(feature.pixel.cast<double>());
     Eigen::Matrix2d J;
     if (!ray || !left_.distort(*ray, &J)) continue;
@@ -44,12 +45,16 @@ SeenFrame PictureTracks::track(int64_t t_us, const cv::Mat& left, const cv::Mat&
     point.left = *ray;
     point.px = std::sqrt(std::abs(J.determinant()));
     frame.points.push_back(point);
+    seen_.push_back({feature, {}});
     queries.push_back({feature.pixel, {}, feature.track});
   }
   if (matcher_ && !right.empty()) {
     const auto found = matcher_->match(left, right, queries);
-    for (size_t i = 0; i < found.size(); ++i)
-      if (found[i]) frame.points[i].right = right_->unproject(found[i]->cast<double>());
+    for (size_t i = 0; i < found.size(); ++i) {
+      if (!found[i]) continue;
+      frame.points[i].right = right_->unproject(found[i]->cast<double>());
+      seen_[i].right = found[i];
+    }
   }
   return frame;
 }
@@ -57,7 +62,13 @@ SeenFrame PictureTracks::track(int64_t t_us, const cv::Mat& left, const cv::Mat&
 void PictureTracks::save(StateWriter& writer) const {
   front_end_->save(writer);
   depths_.save(writer);
-  save_features(features_, writer);
+  std::vector<Feature> features;
+  for (const Seen& seen : seen_) features.push_back(seen.left);
+  save_features(features, writer);
+  for (const Seen& seen : seen_) {
+    writer.put(seen.right.has_value());
+    writer.put(seen.right.value_or(Eigen::Vector2f::Zero()));
+  }
   writer.put(last_us_.has_value());
   writer.put(last_us_.value_or(0));
 }
@@ -65,7 +76,13 @@ void PictureTracks::save(StateWriter& writer) const {
 void PictureTracks::load(StateReader& reader) {
   front_end_->load(reader);
   depths_.load(reader);
-  features_ = load_features(reader);
+  seen_.clear();
+  for (const Feature& feature : load_features(reader)) {
+    const bool known = reader.get<bool>();
+    Eigen::Vector2f right;
+    reader.get(right);
+    seen_.push_back({feature, known ? std::optional(right) : std::nullopt});
+  }
   const bool known = reader.get<bool>();
   const auto last_us = reader.get<int64_t>();
   last_us_ = known ? std::optional<int64_t>(last_us) : std::nullopt;

@@ -26,8 +26,12 @@ class PictureTracks {
   msckf::SeenFrame track(int64_t t_us, const cv::Mat& left, const cv::Mat& right,
                          const std::optional<CameraMotion>& motion);
 
-  /// Where the last picture has its tracks.
-  [[nodiscard]] std::span<const Feature> features() const { return features_; }
+  struct Seen {
+    Feature left;
+    std::optional<Eigen::Vector2f> right;  ///< pixel in the right picture
+  };
+  /// Where the last pictures have their tracks, ascending.
+  [[nodiscard]] std::span<const Seen> seen() const { return seen_; }
   [[nodiscard]] int num_expected() const { return front_end_->num_expected(); }
   [[nodiscard]] std::optional<int64_t> last_us() const { return last_us_; }
 
@@ -40,7 +44,7 @@ class PictureTracks {
   std::optional<StereoMatcher> matcher_;
   std::unique_ptr<FrontEnd> front_end_;
   TrackDepths depths_;
-  std::vector<Feature> features_;
+  std::vector<Seen> seen_;
   std::optional<int64_t> last_us_;
 };
 

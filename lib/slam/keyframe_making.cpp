@@ -166,6 +166,16 @@ bool KeyframeTracker::pull_away(const CameraFrame& frame, const std::vector<Feat
   return true;
 }
 
+/// What the right eye sees, for those who take the tracks.
+void KeyframeTracker::show_right(const std::vector<Feature>& features,
+                                 const std::vector<std::optional<Eigen::Vector2f>>& right) {
+  auto used = out_.features.begin();
+  for (size_t i = 0; i < features.size(); ++i) {  // both in ascending order of track
+    while (used != out_.features.end() && used->feature.track < features[i].track) ++used;
+    if (used != out_.features.end() && used->feature.track == features[i].track) used->right = right[i];
+  }
+}
+
 void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features,
                                     const std::optional<StandingDoubt>& stood) {
   std::vector<Feature> all;
@@ -192,6 +202,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
     }
     stereo_->turn(map_.lens().turned(rig_.T_right_left));
     right = stereo_->match(frame.left, frame.right, queries);
+    show_right(all, right);
   }
   std::vector<KeyframeFeature> seen;
   const Camera right_lens(rig_.right.value_or(rig_.left));

@@ -38,6 +38,7 @@ enum class FeatureUse : int8_t { kNew, kMatched, kInlier, kOutlier };
 struct UsedFeature {
   Feature feature;
   FeatureUse use = FeatureUse::kNew;
+  std::optional<Eigen::Vector2f> right = {};  ///< its pixel in the right picture, of a keyframe
 };
 
 /// What one frame gave.
@@ -239,6 +240,7 @@ class KeyframeTracker {
   [[nodiscard]] bool needs_keyframe(const std::vector<Feature>& features) const;
   void make_keyframe(const CameraFrame& frame, const std::vector<Feature>& features,
                      const std::optional<StandingDoubt>& stood = {});
+  void show_right(const std::vector<Feature>& features, const std::vector<std::optional<Eigen::Vector2f>>& right);
   void remember_place(const CameraFrame& frame, const std::vector<Feature>& features);
   void find_back(const CameraFrame& frame);
   [[nodiscard]] PlaceView view_of(const cv::Mat& gray, const std::vector<Feature>& features, int64_t t_us) const;

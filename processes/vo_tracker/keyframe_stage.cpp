@@ -56,8 +56,10 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
   if (stereo_) spec_.clocks.push_back({kRight, kCameraLost_us});
   spec_.clocks.push_back({kLeft, kCameraLost_us});
   spec_.overload.inputs = stereo_ ? std::vector<int>{kLeft, kRight} : std::vector<int>{kLeft};
-  spec_.outputs = {
-      {"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}, {"POSE_VO_MAP", "pose_t"}};
+  spec_.outputs = {{"POSE_VO", "pose_t"},
+                   {"VO_STATUS", "vo_status_t"},
+                   {"VO_FEATURES", "vo_features2_t"},
+                   {"POSE_VO_MAP", "pose_t"}};
 }
 
 KeyframeStage::~KeyframeStage() = default;
@@ -104,7 +106,7 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   tracked_ = false;
   vo_status_t status = vo_status(frame, tracker_->shared_error_at(now_utime), config_.keyframe.front_end.kind);
   outputs.publish(kStatus, status);
-  vo_features_t features = vo_features(frame);
+  vo_features2_t features = vo_features(frame, config_.keyframe.front_end.kind);
   outputs.publish(kFeatures, features);
 }
 

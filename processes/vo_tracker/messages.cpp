@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "bus/sample_codec.h"
+#include "bus/track_codec.h"
+#include "features/track_noise.h"
 
 namespace roadfix {
 namespace {
@@ -13,7 +15,7 @@ static_assert(static_cast<int>(TrackState::kWeak) == vo_status_t::STATE_WEAK);
 static_assert(static_cast<int>(ScaleSource::kStereo) == vo_status_t::SCALE_FROM_STEREO);
 static_assert(static_cast<int>(ScaleSource::kWheels) == vo_status_t::SCALE_FROM_WHEELS);
 static_assert(static_cast<int>(ScaleSource::kIns) == vo_status_t::SCALE_FROM_INS);
-static_assert(static_cast<int>(FeatureUse::kOutlier) == vo_features_t::USE_OUTLIER);
+static_assert(static_cast<int>(FeatureUse::kOutlier) == vo_features2_t::USE_OUTLIER);
 
 // Of an ordinary car's wheels, where the calibration says nothing: tyres differ by 2 percent, one sample by 0.05 m/s.
 constexpr double kWheelScaleStd = 0.02;
@@ -109,15 +111,17 @@ vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, Fr
   return m;
 }
 
-vo_features_t vo_features(const TrackedFrame& frame) {
-  vo_features_t m{};
+vo_features2_t vo_features(const TrackedFrame& frame, FrontEndKind front_end) {
+  const TrackNoise noise = track_noise(front_end);
+  vo_features2_t m{};
   for (const UsedFeature& f : frame.features) {
-    m.track_id.push_back(f.feature.track);
-    m.u_px.push_back(f.feature.pixel.x());
-    m.v_px.push_back(f.feature.pixel.y());
-    m.use.push_back(static_cast<int8_t>(f.use));
+    TrackSighting s{f.feature.track, f.feature.pixel.cast<double>(), {}, noise.sigma_px, noise.walk_px, 0.0};
+    if (f.right) {
+      s.right = f.right->cast<double>();
+      s.right_sigma_px = noise.right_sigma_px;
+    }
+    append(s, static_cast<int8_t>(f.use), m);
   }
-  m.num_features = static_cast<int32_t>(frame.features.size());
   return m;
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <roadfix/pose_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 
@@ -19,7 +19,7 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
 const char* name_of(FrontEndKind kind);
 
 vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end);
-vo_features_t vo_features(const TrackedFrame& frame);
+vo_features2_t vo_features(const TrackedFrame& frame, FrontEndKind front_end);
 
 void set_reset(int counter, const SE3& delta, pose_t& message);
 Restart restart(const vo_restart_t& message);

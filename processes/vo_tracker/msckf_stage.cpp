@@ -4,14 +4,16 @@
 #include <opencv2/core.hpp>
 #include <roadfix/image_t.hpp>
 #include <roadfix/imu_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
 #include "bus/sample_codec.h"
+#include "bus/track_codec.h"
 #include "bus/types/message.h"
 #include "config/config.h"
+#include "features/track_noise.h"
 #include "geometry/frames.h"
 #include "vo_tracker/camera_rig.h"
 #include "vo_tracker/messages.h"
@@ -101,8 +103,8 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   restart_ = static_cast<int>(spec_.inputs.size());
   spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
-  spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features_t"}};
-  spec_.state_layout = 9;
+  spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features2_t"}};
+  spec_.state_layout = 10;
 }
 
 void MsckfStage::make_parts() {
@@ -194,7 +196,7 @@ void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
   status.scale_source = scale_source(out.scale);
   const double speed = out.odometry.velocity.norm();
   status.scale_std = speed > 0.1 ? std::sqrt(out.odometry.cov_velocity(0, 0)) / speed : 0.0;
-  status.num_features = static_cast<int32_t>(pictures_->features().size());
+  status.num_features = static_cast<int32_t>(pictures_->seen().size());
   status.num_matches = out.num_tracks;
   const msckf::PointCounts& counts = filter_->counts();
   status.num_inliers = counts.used;
@@ -208,14 +210,16 @@ void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
     status.time_offset_std_s = filter_->time_offset_std();
   }
   outputs.publish(kStatus, status);
-  vo_features_t features{};
-  for (const Feature& f : pictures_->features()) {
-    features.track_id.push_back(f.track);
-    features.u_px.push_back(f.pixel.x());
-    features.v_px.push_back(f.pixel.y());
-    features.use.push_back(vo_features_t::USE_MATCHED);
+  const TrackNoise noise = track_noise(config_.msckf.front_end.kind);
+  vo_features2_t features{};
+  for (const PictureTracks::Seen& f : pictures_->seen()) {
+    TrackSighting s{f.left.track, f.left.pixel.cast<double>(), {}, noise.sigma_px, noise.walk_px, 0.0};
+    if (f.right) {
+      s.right = f.right->cast<double>();
+      s.right_sigma_px = noise.right_sigma_px;
+    }
+    append(s, vo_features2_t::USE_MATCHED, features);
   }
-  features.num_features = static_cast<int32_t>(features.track_id.size());
   outputs.publish(kFeatures, features);
 }
 

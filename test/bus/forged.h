@@ -18,7 +18,7 @@
 #include <roadfix/pose_t.hpp>
 #include <roadfix/raw_t.hpp>
 #include <roadfix/state_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
@@ -87,7 +87,7 @@ inline std::vector<Forged> forged_messages(std::mt19937& random) {
   }
   forge<ins_status_t>("INS_STATUS", random, all);
   forge<vo_status_t>("VO_STATUS", random, all);
-  forge<vo_features_t>("VO_FEATURES", random, all);
+  forge<vo_features2_t>("VO_FEATURES", random, all);
   forge<vo_restart_t>("VO_RESTART", random, all);
   forge<fusion_state_t>("FUSION_STATE", random, all);
   for (const char* channel : {"AIDING_INS", "AIDING_FUSION"}) forge<aiding_t>(channel, random, all);

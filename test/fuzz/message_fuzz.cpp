@@ -7,7 +7,7 @@
 #include <roadfix/ledger_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 
 #include "bus/types/field_difference.h"
 #include "bus/types/message.h"
@@ -55,7 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, std::size_t size) {
       try_type<state_t>(bytes);
       break;
     default:
-      try_type<vo_features_t>(bytes);
+      try_type<vo_features2_t>(bytes);
       break;
   }
   return 0;

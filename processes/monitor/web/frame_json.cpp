@@ -103,7 +103,7 @@ Json camera_json(const FrameParts& parts) {
     json["inliers"] = s.num_inliers;
   }
   if (parts.features == nullptr) return json;
-  const vo_features_t& f = *parts.features;
+  const vo_features2_t& f = *parts.features;
   json["features_of"] = std::to_string(f.utime);
   Json& points = json["features"] = Json::array();
   for (std::size_t i = 0; i < std::min(kMostFeatures, f.track_id.size()); ++i) {

@@ -6,7 +6,7 @@
 #include <roadfix/fusion_state_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/ins_status_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <string>
 #include <vector>
@@ -38,7 +38,7 @@ struct FrameParts {
   std::optional<Eigen::Vector2d> fix;  ///< of the newest GNSS fix: east, north of the antenna, m
   const fusion_state_t* fusion = nullptr;
   const vo_status_t* vo_status = nullptr;
-  const vo_features_t* features = nullptr;
+  const vo_features2_t* features = nullptr;
   const ins_status_t* ins_status = nullptr;
   const gnss_t* gnss = nullptr;
   int64_t picture_utime = 0;  ///< of the newest picture; 0: none

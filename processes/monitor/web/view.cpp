@@ -42,8 +42,8 @@ void DriveView::message(const std::string& channel, const std::string& type, con
     fusion_ = decode<fusion_state_t>(message.bytes);
   } else if (type == "vo_status_t") {
     vo_status_ = decode<vo_status_t>(message.bytes);
-  } else if (type == "vo_features_t" && board_.watched()) {
-    features_ = decode<vo_features_t>(message.bytes);
+  } else if (type == "vo_features2_t" && board_.watched()) {
+    features_ = decode<vo_features2_t>(message.bytes);
   } else if (type == "ins_status_t") {
     ins_status_ = decode<ins_status_t>(message.bytes);
   } else if (type == "gnss_t") {

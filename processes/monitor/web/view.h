@@ -6,7 +6,7 @@
 #include <roadfix/fusion_state_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/ins_status_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <string>
 
@@ -59,7 +59,7 @@ class DriveView : public MonitorListener {
   PoseWatch reference_;
   std::optional<fusion_state_t> fusion_;
   std::optional<vo_status_t> vo_status_;
-  std::optional<vo_features_t> features_;
+  std::optional<vo_features2_t> features_;
   std::optional<ins_status_t> ins_status_;
   std::optional<gnss_t> gnss_;
   int64_t picture_utime_ = 0;

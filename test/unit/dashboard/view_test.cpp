@@ -6,6 +6,7 @@
 #include <roadfix/image_t.hpp>
 #include <roadfix/pose_t.hpp>
 
+#include "bus/track_codec.h"
 #include "bus/types/message.h"
 #include "monitor/handler.h"
 
@@ -128,12 +129,9 @@ TEST_CASE("fusion, camera and history are in the frame") {
   image.data = {9};
   image.size_bytes = 1;
   bench.send("CAMERA_LEFT", kStart_us + 2'010'000, image);
-  vo_features_t features{};
-  features.num_features = 1;
-  features.track_id = {5};
-  features.u_px = {10.4F};
-  features.v_px = {20.0F};
-  features.use = {vo_features_t::USE_INLIER};
+  vo_features2_t features{};
+  append({.track = 5, .left = {10.4, 20.0}, .right = {}, .sigma_px = 0.1, .walk_px = 0.1}, vo_features2_t::USE_INLIER,
+         features);
   bench.send("VO_FEATURES", kStart_us + 2'020'000, features);
   bench.send("IMU", kStart_us + 2'600'000, fusion);
   const auto frame = bench.frame();

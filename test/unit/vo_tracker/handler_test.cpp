@@ -4,10 +4,11 @@
 #include <catch2/catch.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 
+#include "bus/track_codec.h"
 #include "config/config.h"
 #include "geometry/so3.h"
 #include "small_street.h"
@@ -21,7 +22,7 @@ TEST_CASE("a pose, a status and the features come with every frame, for now") {
   const Collector out = run(pictures(), true);
   const auto poses = out.all<pose_t>("POSE_VO");
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
-  const auto features = out.all<vo_features_t>("VO_FEATURES");
+  const auto features = out.all<vo_features2_t>("VO_FEATURES");
   REQUIRE(poses.size() == kFrames);
   REQUIRE(statuses.size() == kFrames);
   REQUIRE(features.size() == kFrames);
@@ -47,6 +48,24 @@ TEST_CASE("a pose, a status and the features come with every frame, for now") {
   CHECK(statuses.back().num_keyframes > 5);
   CHECK(statuses.back().brightness > 30.0);
   CHECK(features.back().num_features == statuses.back().num_features);
+}
+
+TEST_CASE("tracks come in ascending order with their noise, and with the right eye's place where a keyframe looked") {
+  for (const bool stereo : {true, false}) {
+    const Collector out = run(pictures(), stereo);
+    size_t seen = 0, ahead = 0;
+    for (const vo_features2_t& m : out.all<vo_features2_t>("VO_FEATURES")) {
+      const TrackPicture picture = track_picture(m);
+      CHECK(picture.tracks.size() == static_cast<size_t>(m.num_features));  // all of them are measurements
+      for (const TrackSighting& s : picture.tracks) {
+        if (!s.right) continue;
+        ++seen;
+        ahead += s.right->x() < s.left.x() ? 1 : 0;
+      }
+    }
+    CHECK((seen > 500) == stereo);
+    CHECK(ahead == seen);
+  }
 }
 
 TEST_CASE("one thread or two, late wheels or punctual ones: the same bytes") {

@@ -4,7 +4,7 @@
 #include <roadfix/ledger_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <roadfix/wheels_t.hpp>

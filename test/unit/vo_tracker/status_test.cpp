@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 #include <roadfix/pose_t.hpp>
-#include <roadfix/vo_features_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 
 #include "small_street.h"
@@ -147,7 +147,7 @@ TEST_CASE("the status counts what the features show, in every picture") {
   for (const bool stereo : {true, false}) {
     const Collector out = run(pictures(), stereo);
     const auto statuses = out.all<vo_status_t>("VO_STATUS");
-    const auto features = out.all<vo_features_t>("VO_FEATURES");
+    const auto features = out.all<vo_features2_t>("VO_FEATURES");
     REQUIRE(statuses.size() == features.size());
     int judged_pictures = 0, outliers = 0;
     for (size_t i = 0; i < statuses.size(); ++i) {
@@ -156,10 +156,10 @@ TEST_CASE("the status counts what the features show, in every picture") {
       const auto count = [&](int8_t use) {
         return static_cast<int>(std::count(features[i].use.begin(), features[i].use.end(), use));
       };
-      const int inlier = count(vo_features_t::USE_INLIER), outlier = count(vo_features_t::USE_OUTLIER);
+      const int inlier = count(vo_features2_t::USE_INLIER), outlier = count(vo_features2_t::USE_OUTLIER);
       CHECK(s.utime == features[i].utime);
       CHECK(s.num_features == features[i].num_features);
-      CHECK(s.num_matches == inlier + outlier + count(vo_features_t::USE_MATCHED));
+      CHECK(s.num_matches == inlier + outlier + count(vo_features2_t::USE_MATCHED));
       CHECK(s.num_inliers == inlier);
       CHECK(s.inlier_ratio == Approx(inlier + outlier > 0 ? static_cast<double>(inlier) / (inlier + outlier) : 0.0));
       judged_pictures += inlier + outlier > 0 ? 1 : 0;
