@@ -3,8 +3,8 @@
 #   purity.sh ROOT
 set -uo pipefail
 cd "$1" || exit 2
-order=(geometry statistics geodesy samples stream gnss_ins wheel camera features slam msckf fusion health evaluation simulation)
-estimators=' gnss_ins wheel slam msckf fusion '
+order=(geometry statistics geodesy samples stream gnss_ins wheel camera features slam msckf navigation fusion health evaluation simulation)
+estimators=' gnss_ins wheel slam msckf navigation fusion '
 breaches=0
 
 # report WHY: counts and prints the lines on standard input, comments left out.

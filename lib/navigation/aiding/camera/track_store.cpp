@@ -1,0 +1,52 @@
+#include "navigation/aiding/camera/track_store.h"
+
+#include <algorithm>
+
+namespace roadfix::navigation {
+
+void TrackStore::pass(const SeenPicture& picture) {
+  auto point = picture.points.begin();
+  for (Track& track : tracks_) {
+    while (point != picture.points.end() && point->track < track.id) ++point;
+    track.alive = track.alive && point != picture.points.end() && point->track == track.id;
+    if (track.alive) track.walk_px2 += point->walk_px * point->walk_px;
+  }
+}
+
+void TrackStore::add(const SeenPicture& picture, int64_t clone) {
+  pass(picture);
+  for (const SeenPoint& point : picture.points) {
+    auto place = std::lower_bound(tracks_.begin(), tracks_.end(), point.track,
+                                  [](const Track& t, int64_t wanted) { return t.id < wanted; });
+    if (place == tracks_.end() || place->id != point.track) {
+      if (tracks_.size() >= kMostTracks) continue;
+      place = tracks_.insert(place, Track{});  // at the end: numbers ascend
+      place->id = point.track;
+    }
+    if (!place->alive || place->count >= kMaxViews) continue;
+    place->seen[static_cast<size_t>(place->count++)] = {clone,          point.left,      point.right,
+                                                        point.sigma_px, place->walk_px2, point.right_sigma_px};
+    place->walk_px2 = 0.0;
+  }
+}
+
+void TrackStore::forget_clone(int64_t clone) {
+  for (Track& track : tracks_) {
+    double walked = 0.0;
+    int kept = 0;
+    for (int i = 0; i < track.count; ++i) {
+      Sighting& s = track.seen[static_cast<size_t>(i)];
+      s.walk_px2 += walked;
+      walked = s.clone == clone ? s.walk_px2 : 0.0;
+      if (s.clone != clone) track.seen[static_cast<size_t>(kept++)] = s;
+    }
+    track.walk_px2 += walked;
+    track.count = kept;
+  }
+}
+
+void TrackStore::drop_ended() {
+  std::erase_if(tracks_, [](const Track& t) { return !t.alive; });
+}
+
+}  // namespace roadfix::navigation

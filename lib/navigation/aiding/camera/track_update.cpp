@@ -1,0 +1,90 @@
+#include "navigation/aiding/camera/track_update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace roadfix::navigation {
+
+TrackUpdate::TrackUpdate(const TrackTuning& tuning)
+    : tuning_(tuning),
+      work_(kMaxTrackRows, kTrackWidth),
+      stack_(kStackRows, TrackColumns::kMost + 1),
+      HP_(kMaxTrackRows, TrackColumns::kMost),
+      S_(kMaxTrackRows, kMaxTrackRows) {}
+
+void TrackUpdate::begin(const TrackWindow& window) {
+  window_ = &window;
+  counts_ = {};
+  stacked_ = 0;
+}
+
+double TrackUpdate::nis(int first_row, int rows) {
+  const int n = window_->columns();
+  const auto H = work_.block(first_row, 3, rows, n);
+  auto HP = HP_.topLeftCorner(rows, n);
+  auto S = S_.topLeftCorner(rows, rows);
+  HP.noalias() = H * window_->P.topLeftCorner(n, n);
+  S.noalias() = HP * H.transpose();
+  S.diagonal().array() += 1.0;
+  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);
+  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxTrackRows, 1> r = work_.block(first_row, 3 + n, rows, 1);
+  llt.matrixL().solveInPlace(r);
+  return r.squaredNorm();
+}
+
+bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
+  if (static_cast<int>(sightings.size()) < std::max(2, tuning_.min_sightings)) return false;
+  for (size_t i = 0; i < sightings.size(); ++i) {
+    straight_[i] = sightings[i];
+    straight_[i].left.z = straightened(window_->camera, sightings[i].left.z);
+  }
+  const std::span<const ViewSighting> seen(straight_.data(), sightings.size());
+  const int anchor = seen.front().view;
+  const auto f =
+      triangulate(window_->camera, window_->views, seen, anchor, window_->two_eyes, tuning_.place_px, tuning_.nearest);
+  if (!f) {
+    ++counts_.not_placed;
+    return false;
+  }
+  const int n = window_->columns();
+  auto work = work_.leftCols(3 + n + 1);
+  const int rows = linearise_track(window_->camera, window_->views, seen, anchor, window_->two_eyes, *f, work);
+  if (window_->expected.size() > 0) work.col(3 + n).head(rows) -= work.block(0, 3, rows, n) * window_->expected.head(n);
+  whiten_track(seen, window_->two_eyes, work.topRows(rows));
+  eliminate_columns(work.topRows(rows), 3);
+  const int dof = rows - 3;
+  const double squared = nis(3, dof);
+  if (!(squared <= tuning_.refuse * dof)) {
+    ++counts_.refused;
+    return false;
+  }
+  ++counts_.used;
+  counts_.nis_sum += squared;
+  counts_.dof_sum += dof;
+  const double weight = std::min(1.0, (tuning_.tails + dof) / (tuning_.tails + squared));  // (N.6.11)
+  work.block(3, 3, dof, n + 1) *= std::sqrt(weight);
+  push(work.block(3, 3, dof, n + 1));
+  return true;
+}
+
+void TrackUpdate::push(const Eigen::Ref<const Eigen::MatrixXd>& rows) {
+  if (stacked_ + rows.rows() > kStackRows) compress();
+  stack_.block(stacked_, 0, rows.rows(), rows.cols()) = rows;
+  stacked_ += static_cast<int>(rows.rows());
+}
+
+void TrackUpdate::compress() {
+  const int n = window_->columns();
+  if (stacked_ <= n) return;
+  eliminate_columns(stack_.topLeftCorner(stacked_, n + 1), n);
+  stacked_ = n;
+}
+
+Eigen::Ref<const Eigen::MatrixXd> TrackUpdate::rows() {
+  compress();
+  return stack_.topLeftCorner(stacked_, window_->columns() + 1);
+}
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,71 @@
+/// From finished tracks to rows that measure the camera and the poses of its window: triangulation, noise along the
+/// track, elimination of the point, weight, compression, (N.6.7)-(N.6.12). Knows the covariance of its columns, not the
+/// state.
+#pragma once
+
+#include "navigation/aiding/camera/track_rows.h"
+
+namespace roadfix::navigation {
+
+struct TrackTuning {
+  double place_px = 0.5;  ///< standard deviation of a place, all told: for the triangulation's weights
+  double refuse = 9.0;    ///< times its degrees of freedom: nis of a track that is no point of this world
+  double nearest = 0.5;   ///< m, of points from an eye
+  double tails = 2.0;     ///< degrees of freedom of Student's t over tracks
+  int min_sightings = 3;  ///< of a finished track
+};
+
+/// What an update did with the tracks that it was given.
+struct TrackCounts {
+  int used = 0;
+  int refused = 0;
+  int not_placed = 0;    ///< no triangulation
+  double nis_sum = 0.0;  ///< of used tracks, before their weight
+  int dof_sum = 0;       ///< likewise
+
+  [[nodiscard]] int tried() const { return used + refused; }
+};
+
+/// What the rows are linearised at.
+struct TrackWindow {
+  CameraGeometry camera;
+  std::vector<ViewPose> views;
+  bool two_eyes = false;
+  Eigen::MatrixXd P;         ///< of the columns, TrackColumns::of_view(number of views) of them
+  Eigen::VectorXd expected;  ///< what their errors are expected to be; empty: zero
+
+  [[nodiscard]] int columns() const { return TrackColumns::of_view(static_cast<int>(views.size())); }
+};
+
+class TrackUpdate {
+ public:
+  explicit TrackUpdate(const TrackTuning& tuning);
+
+  /// Opens an update.
+  void begin(const TrackWindow& window);
+  /// One finished track. False where it was not used.
+  bool add(std::span<const ViewSighting> sightings);
+  /// [H | r] of all that was added, white, at most as many rows as columns; valid until the next begin().
+  [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> rows();
+
+  [[nodiscard]] const TrackCounts& counts() const { return counts_; }
+
+ private:
+  static constexpr int kStackRows = 1024;
+
+  /// Squared length of the rows' residual by what is expected of it; infinite where that breaks.
+  [[nodiscard]] double nis(int first_row, int rows);
+  void push(const Eigen::Ref<const Eigen::MatrixXd>& rows);
+  void compress();
+
+  TrackTuning tuning_;
+  TrackCounts counts_;
+  const TrackWindow* window_ = nullptr;
+  std::array<ViewSighting, kMaxViews> straight_;
+  Eigen::MatrixXd work_;   ///< kMaxTrackRows x kTrackWidth
+  Eigen::MatrixXd stack_;  ///< kStackRows x (columns + 1)
+  Eigen::MatrixXd HP_, S_;
+  int stacked_ = 0;
+};
+
+}  // namespace roadfix::navigation
