@@ -8,6 +8,8 @@
 #include "evaluation/trajectory_formats.h"
 #include "roadfix/commands.h"
 #include "roadfix/evaluate/evaluation_log.h"
+#include "roadfix/export/mcap_export.h"
+#include "roadfix/export/output_file.h"
 
 namespace roadfix {
 namespace {
@@ -34,7 +36,19 @@ void write(std::ostream& out, const PoseStream& stream, const Options& options) 
   }
 }
 
+/// The whole log; what is said goes to standard error, where the file may not be.
+void run_mcap(const Options& options) {
+  if (options.out != "-") refuse_to_replace(options.log, options.out);
+  LogReader log(options.log);
+  OutputFile out(options.out);
+  const McapSummary summary = write_mcap(log, [&](std::span<const uint8_t> bytes) { out.write(bytes); });
+  out.commit();
+  for (const std::string& note : summary.notes) std::cerr << "roadfix export: " << note << "\n";
+  if (!out.is_standard_output()) std::cout << options.out.string() << "\n";
+}
+
 void run(const Options& options) {
+  if (options.format == "mcap") return run_mcap(options);
   const EvaluationLog log = read_evaluation_log(options.log, {options.channel});
   for (const std::string& note : log.notes) std::cerr << "roadfix export: " << note << "\n";
   const auto stream = log.poses.find(options.channel);
@@ -51,13 +65,15 @@ void run(const Options& options) {
 
 void add_export_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("export", "Write a channel's poses as TUM, KITTI, CSV or GeoJSON");
+  CLI::App* command =
+      app.add_subcommand("export", "Write a channel's poses as TUM, KITTI, CSV or GeoJSON, or a whole log as MCAP");
   command->add_option("log", options->log, "a log with poses")->required()->check(CLI::ExistingFile);
-  command->add_option("--channel", options->channel, "POSE_INS, POSE_FUSED, REFERENCE ...")->capture_default_str();
-  command->add_option("--format", options->format)
-      ->check(CLI::IsMember({"tum", "kitti", "csv", "geojson"}))
+  command->add_option("--channel", options->channel, "POSE_INS, POSE_FUSED, REFERENCE ...; MCAP has every channel")
       ->capture_default_str();
-  command->add_option("--out", options->out, "the file to write")->required();
+  command->add_option("--format", options->format)
+      ->check(CLI::IsMember({"tum", "kitti", "csv", "geojson", "mcap"}))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "the file to write; MCAP: - for standard output")->required();
   command->callback([options] { run(*options); });
 }
 
