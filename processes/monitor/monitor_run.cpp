@@ -15,7 +15,7 @@
 #include "monitor/handler.h"
 #include "monitor/health_publisher.h"
 #include "monitor/host_facts.h"
-#include "monitor/merged_logs.h"
+#include "bus/log/merged_logs.h"
 #include "monitor/terminal.h"
 
 namespace roadfix {

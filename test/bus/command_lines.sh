@@ -11,7 +11,7 @@ stages="gnss_ins_ekf wheel_odometry imm_fusion vo_tracker"
 drivers="camera_driver gnss_driver imu_driver wheel_driver"
 help_of() { "$bin/$1" --help | tr '\n' ' ' | tr -s ' '; }
 
-for program in $stages $drivers recorder monitor; do
+for program in $stages $drivers recorder monitor pose_server; do
   "$bin/$program" --help >"$folder/help" 2>"$folder/errors" || fail "$program --help ends with $?"
   [[ -s $folder/errors ]] && fail "$program --help says something on stderr"
   for words in "--config TEXT.*The vehicle's configuration folder" "--bus TEXT=udpm://239.255.76.67:7667?ttl=0 LCM URL" \

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "drivers/device/byte_source.h"
+#include "drivers/device/serial_port.h"
 
 namespace roadfix {
 
@@ -93,18 +94,26 @@ void take_for_us_alone(int descriptor, const std::string& name) {
 
 }  // namespace
 
-std::unique_ptr<ByteSource> open_serial(const std::string& path, int baud) {
+int open_serial_port(const std::string& path, int baud) {
   const speed_t speed = speed_of(baud);
   const int descriptor = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) throw SourceError(path + ": " + std::strerror(errno));
-  auto source = std::make_unique<SerialSource>(descriptor, path);
-  make_raw(descriptor, speed, path);
-  take_for_us_alone(descriptor, path);
+  try {
+    make_raw(descriptor, speed, path);
+    take_for_us_alone(descriptor, path);
+  } catch (...) {
+    ::close(descriptor);
+    throw;
+  }
   ::tcflush(descriptor, TCIFLUSH);
-  return source;
+  return descriptor;
 }
 
-std::unique_ptr<ByteSource> open_pty() {
+std::unique_ptr<ByteSource> open_serial(const std::string& path, int baud) {
+  return std::make_unique<SerialSource>(open_serial_port(path, baud), path);
+}
+
+Pty open_pty_ends() {
   const int main = ::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (main < 0 || ::grantpt(main) != 0 || ::unlockpt(main) != 0) {
     if (main >= 0) ::close(main);
@@ -112,9 +121,19 @@ std::unique_ptr<ByteSource> open_pty() {
   }
   const std::string name = ::ptsname(main);
   const int end = ::open(name.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
-  auto source = std::make_unique<PtySource>(main, end, name);
-  make_raw(end, B115200, name);
-  return source;
+  try {
+    make_raw(end, B115200, name);
+  } catch (...) {
+    ::close(main);
+    if (end >= 0) ::close(end);
+    throw;
+  }
+  return {main, end, name};
+}
+
+std::unique_ptr<ByteSource> open_pty() {
+  const Pty pty = open_pty_ends();
+  return std::make_unique<PtySource>(pty.main, pty.end, pty.name);
 }
 
 }  // namespace roadfix

@@ -7,7 +7,7 @@
 #include "bus/run/replay.h"
 #include "bus/types/message.h"
 #include "monitor/handler.h"
-#include "monitor/merged_logs.h"
+#include "bus/log/merged_logs.h"
 #include "roadfix/stages.h"
 #include "support/shared_data.h"
 #include "support/temporary_folder.h"

@@ -1,4 +1,4 @@
-#include "monitor/merged_logs.h"
+#include "bus/log/merged_logs.h"
 
 #include <algorithm>
 #include <cmath>
