@@ -1,0 +1,231 @@
+#include "navigation/filter.h"
+
+#include <algorithm>
+
+#include "geometry/so3.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+// Rate and acceleration are smoothed over this time: long enough against vibration, short against a car's manoeuvres.
+constexpr double kMotionTime = 0.05;  // s
+
+double square(double x) { return x * x; }
+
+}  // namespace
+
+Filter::Filter(const NavigationConfig& config, const inertial::Earth& earth, bool camera)
+    : config_(config), earth_(earth), state_(camera), scratch_(Eigen::VectorXd::Zero(state_.P().rows())) {}
+
+void Filter::initialise(const Mean& mean, const BaseVector& std) {
+  state_.reset(mean, std.cwiseAbs2());
+  sums_ = inertial::TransitionSums();
+  last_ = inertial::InertialStep();
+  motion_ = BodyMotion();
+}
+
+void integrate(Mean& x, inertial::InertialStep& last, BodyMotion& motion, inertial::Earth& earth, const ImuSample& imu,
+               double dt) {
+  const inertial::InertialStep step = x.corrected(imu.gyro, imu.accel, dt);
+  const Eigen::Vector3d v_before = x.nav.velocity;
+  const Eigen::Vector3d earth_rate = x.nav.q_level_imu.conjugate() * earth.rate();
+  inertial::mechanise(x.nav, last, step, earth);
+  x.t_us = imu.t_us;
+  const double weight = last.dt > 0.0 ? dt / (dt + kMotionTime) : 1.0;
+  motion.rate += weight * (step.rate - earth_rate - motion.rate);
+  motion.acceleration += weight * ((1.0 / dt) * (x.nav.velocity - v_before) - motion.acceleration);
+  last = step;
+}
+
+void Filter::predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise) {
+  Mean& x = state_.x;
+  sums_.add(x.nav, x.corrected(imu.gyro, imu.accel, dt), noise.gyro, noise.accel);
+  integrate(x, last_, motion_, earth_, imu, dt);
+  x.gnss_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.position_time);
+  x.gnss_velocity_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.velocity_time);
+  if (sums_.duration() >= config_.process.covariance_interval - 1e-9) flush();
+}
+
+inertial::ErrorTransition Filter::transition() const {
+  inertial::Earth earth = earth_;
+  return sums_.transition(state_.x.nav, state_.p_ref, earth.gravity(state_.x.nav.position), earth.rate());
+}
+
+Filter::Diagonal Filter::diagonal(double T) const {
+  Diagonal d;
+  d.decay.setOnes();
+  d.noise.setZero();
+  const VehicleFacts& v = config_.facts;
+  const ProcessNoise& p = config_.process;
+  // (N.2.4): the in-run part of biases and scales walks; what is beyond it is constant since turn-on.
+  const double walk = 2.0 * T / v.correlation_s;
+  d.noise.segment<3>(kGyroBias).setConstant(walk * square(std::min(v.gyro_bias_std, p.gyro_drift_max)));
+  d.noise.segment<3>(kAccelBias).setConstant(walk * square(std::min(v.accel_bias_std, p.accel_drift_max)));
+  d.noise.segment<6>(kGyroScale).setConstant(walk * square(v.scale_std));
+  // What the calibration calls exact stays put.
+  if (v.wheel_scale_std > 0.0) d.noise(kWheelScale) = square(p.wheel_scale_walk) * T;
+  for (int i = 0; i < 2; ++i)
+    if (v.mounting_std(1 + i) > 0.0) d.noise(kMounting + i) = square(p.mounting_walk) * T;
+  for (int i = 0; i < 3; ++i)
+    if (v.p_imu_antenna_std(i) > 0.0) d.noise(kAntenna + i) = square(p.antenna_walk) * T;
+  const ClockPriors time(v);
+  const double clock = square(p.clock_walk) * T;
+  if (time.imu_offset > 0.0) d.noise(kImuOffset) = clock;
+  if (time.position_latency > 0.0 && v.time_offset_std > 0.0) d.noise(kPositionLatency) = clock;
+  if (time.wheel_latency > 0.0 && v.time_offset_std > 0.0 && time.imu_offset == 0.0) d.noise(kWheelLatency) = clock;
+  const double position_decay = inertial::gauss_markov_decay(T, gnss_bias_.position_time);
+  const double velocity_decay = inertial::gauss_markov_decay(T, gnss_bias_.velocity_time);
+  d.decay.segment<3>(kGnssBias).setConstant(position_decay);
+  d.decay.segment<3>(kGnssVelocityBias).setConstant(velocity_decay);
+  d.noise.segment<3>(kGnssBias) = (1.0 - square(position_decay)) * gnss_bias_.position_std.cwiseAbs2();
+  d.noise.segment<3>(kGnssVelocityBias) = (1.0 - square(velocity_decay)) * gnss_bias_.velocity_std.cwiseAbs2();
+  return d;
+}
+
+void Filter::flush() {
+  const double T = sums_.duration();
+  if (T <= 0.0) return;
+  inertial::ErrorTransition step = transition();
+  // Without poses in the state the reference point stays at the position, (N.1.5).
+  if (state_.clones.empty()) {
+    const Eigen::Matrix3d D = skew(state_.x.nav.position - state_.p_ref);
+    inertial::Matrix9d move = inertial::Matrix9d::Identity();
+    move.block<3, 3>(kPos, kAtt) = -D;
+    step.F = (move * step.F).eval();
+    step.Q = (move * step.Q * move.transpose()).eval();
+    state_.p_ref = state_.x.nav.position;
+  }
+  const int n = state_.size();
+  Eigen::MatrixXd& P = state_.P();
+  Eigen::Matrix<double, 9, Eigen::Dynamic, 0, 9, kMaxSize> rows(9, n);
+  rows.noalias() = step.F.lazyProduct(P.topLeftCorner(kInertialSize, n));
+  inertial::Matrix9d own = step.Q;
+  own.noalias() += rows.leftCols<kInertialSize>().lazyProduct(step.F.transpose());
+  const Diagonal d = diagonal(T);
+  if (state_.held()) state_.expected().head<9>() = (step.F * state_.expected().head<kInertialSize>()).eval();
+  for (int k = kGnssBias; k < kGnssBias + 6; ++k) {  // the only states that decay
+    P.row(k).head(n) *= d.decay(k);
+    P.col(k).head(n) *= d.decay(k);
+    rows.col(k) *= d.decay(k);
+  }
+  P.topLeftCorner<9, 9>() = 0.5 * (own + own.transpose());
+  P.block(0, 9, 9, n - 9) = rows.rightCols(n - 9);
+  P.block(9, 0, n - 9, 9) = rows.rightCols(n - 9).transpose();
+  P.diagonal().head<kWithoutCamera>() += d.noise;
+  sums_ = inertial::TransitionSums();
+}
+
+template <int Rows>
+Eigen::Matrix<double, Rows, Rows> Filter::innovation_covariance(const Measurement<Rows>& m) const {
+  Eigen::Matrix<double, Rows, kWithoutCamera> H = m.H;
+  Eigen::Matrix<double, Rows, Rows> S = m.R;
+  if (const double T = sums_.duration(); T > 0.0) {  // as if the covariance had been moved
+    const inertial::ErrorTransition step = transition();
+    const Diagonal d = diagonal(T);
+    const Eigen::Matrix<double, Rows, 9> moved = m.H.template leftCols<9>();
+    S += moved * step.Q * moved.transpose();
+    S += m.H * d.noise.asDiagonal() * m.H.transpose();
+    H.template leftCols<9>().setZero();
+    H = H * d.decay.asDiagonal();
+    H.template leftCols<kInertialSize>() += moved * step.F;
+  }
+  S += H * state_.P().template topLeftCorner<kWithoutCamera, kWithoutCamera>() * H.transpose();
+  return 0.5 * (S + S.transpose());
+}
+
+template <int Rows>
+AidingRecord Filter::judge(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) const {
+  const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
+  AidingRecord r = record_of(source, AidingStatus::kBadInput, t_us);
+  r.dof = Rows;
+  r.nis = innovation.nis;
+  r.log_likelihood = innovation.log_likelihood;
+  for (int i = 0; i < Rows; ++i) {
+    r.innovation[static_cast<size_t>(i)] = m.residual(i);
+    r.innovation_variance[static_cast<size_t>(i)] = innovation.S(i, i);
+  }
+  if (innovation.usable) r.status = innovation.nis <= gate ? AidingStatus::kAccepted : AidingStatus::kGated;
+  return r;
+}
+
+template <int Rows>
+void Filter::apply(const Measurement<Rows>& m) {
+  const int n = state_.size();
+  const Eigen::MatrixXd& P = state_.P();
+  using Gain = Eigen::Matrix<double, Eigen::Dynamic, Rows, 0, kMaxSize, Rows>;
+  Gain Y = Gain::Zero(n, Rows);
+  for (int k = 0; k < kWithoutCamera; ++k)  // most of H is zero
+    for (int r = 0; r < Rows; ++r)
+      if (m.H(r, k) != 0.0) Y.col(r) += m.H(r, k) * P.col(k).head(n);
+  const Eigen::Matrix<double, Rows, Rows> S = m.H.lazyProduct(Y.template topRows<kWithoutCamera>()) + m.R;
+  const Innovation<Rows> innovation(m.residual, 0.5 * (S + S.transpose()));
+  if (!innovation.usable) return;
+  for (int i = 0; i < Rows; ++i) {  // Y L^-T, (N.3.2)
+    for (int k = 0; k < i; ++k) Y.col(i) -= innovation.L(i, k) * Y.col(k);
+    Y.col(i) /= innovation.L(i, i);
+  }
+  Eigen::VectorXd& d = scratch_;
+  d.head(n) = Y.lazyProduct(innovation.whitened);
+  if (considered_size_ == 0) {
+    state_.subtract(Y);
+  } else {
+    const Eigen::MatrixXd kept = P.block(considered_first_, considered_first_, considered_size_, considered_size_);
+    state_.subtract(Y);
+    state_.P().block(considered_first_, considered_first_, considered_size_, considered_size_) = kept;
+    d.segment(considered_first_, considered_size_).setZero();
+  }
+  state_.correct(d);
+}
+
+template <int Rows>
+AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
+  const AidingRecord record = judge(source, t_us, m, gate);
+  if (record.status != AidingStatus::kAccepted) return record;
+  flush();
+  apply(m);
+  return record;
+}
+
+void Filter::reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vector3d& std) {
+  flush();
+  const int n = state_.size();
+  Eigen::MatrixXd& P = state_.P();
+  P.middleRows<3>(at).leftCols(n).setZero();
+  P.middleCols<3>(at).topRows(n).setZero();
+  P.diagonal().segment<3>(at) = std.cwiseAbs2();
+  if (at == kGnssBias) state_.x.gnss_bias = value;
+  if (at == kGnssVelocityBias) state_.x.gnss_velocity_bias = value;
+}
+
+void Filter::widen(const BaseVector& d) {
+  flush();
+  state_.P().topLeftCorner<kWithoutCamera, kWithoutCamera>() +=
+      (d.head<kWithoutCamera>() * d.head<kWithoutCamera>().transpose()).eval();
+}
+
+double Filter::longest_age(bool wheels) const {
+  double longest = 0.0;
+  const Mean& x = state_.x;
+  const Eigen::MatrixXd& P = state_.P();
+  for (const auto& [at, value] :
+       {std::pair{kPositionLatency, x.position_latency}, std::pair{kVelocityLatency, x.velocity_latency},
+        std::pair{kWheelLatency, x.wheel_latency}}) {
+    if (at == kWheelLatency && !wheels) continue;
+    const double variance = P(at, at) + P(kImuOffset, kImuOffset) - 2.0 * P(at, kImuOffset);
+    longest = std::max(longest, value - x.imu_offset + 3.0 * std::sqrt(std::max(variance, 0.0)));
+  }
+  return longest;
+}
+
+double Filter::heading_std() const { return std::sqrt(state_.P()(kAtt + 2, kAtt + 2)); }
+
+#define ROADFIX_INSTANTIATE(ROWS)                                                              \
+  template AidingRecord Filter::fuse(AidingSource, int64_t, const Measurement<ROWS>&, double); \
+  template AidingRecord Filter::judge(AidingSource, int64_t, const Measurement<ROWS>&, double) const;
+ROADFIX_INSTANTIATE(1)
+ROADFIX_INSTANTIATE(2)
+ROADFIX_INSTANTIATE(3)
+#undef ROADFIX_INSTANTIATE
+
+}  // namespace roadfix::navigation

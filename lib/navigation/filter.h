@@ -1,0 +1,105 @@
+/// One hypothesis of the navigation filter: state, propagation and update. It knows nothing of start, time order or
+/// when a source is used. Guarantees: same inputs in the same order give the same bits; a rejected measurement changes
+/// nothing, not even where covariance steps begin and end; no allocation after construction. Not thread safe.
+#pragma once
+
+#include "inertial/strapdown.h"
+#include "navigation/config.h"
+#include "navigation/measurement.h"
+
+namespace roadfix::navigation {
+
+/// What measurements need of the motion at the state's epoch besides the state.
+struct BodyMotion {
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< rad/s against the Earth, imu axes, smoothed
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s2, dv/dt, level axes, smoothed
+};
+
+/// Moves the means over the `dt` s that end at imu.t_us, (N.2.1) to (N.2.3); GNSS biases decay elsewhere.
+void integrate(Mean& x, inertial::InertialStep& last, BodyMotion& motion, inertial::Earth& earth, const ImuSample& imu,
+               double dt);
+
+class Filter {
+ public:
+  Filter(const NavigationConfig& config, const inertial::Earth& earth, bool camera);
+
+  /// Starts at `mean` with these standard deviations.
+  void initialise(const Mean& mean, const BaseVector& std);
+
+  /// Moves mean and covariance over the `dt` s that end at imu.t_us, (N.2).
+  void predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise);
+  /// Moves the covariance to the state's epoch.
+  void flush();
+
+  /// Uses m unless its normalised innovation squared exceeds `gate`.
+  template <int Rows>
+  AidingRecord fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate);
+  /// As if used, without using it.
+  template <int Rows>
+  [[nodiscard]] AidingRecord judge(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) const;
+
+  /// States that measurements do not move from now on, though their uncertainty counts (Schmidt 1966).
+  void consider(int first, int size) {
+    considered_first_ = first;
+    considered_size_ = size;
+  }
+  /// Stationary standard deviation (m or m/s, level axes) and correlation time of the receiver's Gauss-Markov errors.
+  struct GnssBias {
+    Eigen::Vector3d position_std = Eigen::Vector3d::Zero(), velocity_std = Eigen::Vector3d::Zero();
+    double position_time = 30.0, velocity_time = 2.0;  ///< s
+  };
+  [[nodiscard]] GnssBias& gnss_bias() { return gnss_bias_; }
+  [[nodiscard]] const GnssBias& gnss_bias() const { return gnss_bias_; }
+  /// The block's value and covariance become this, without correlation with anything else.
+  void reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vector3d& std);
+  /// P += d d' over the base block.
+  void widen(const BaseVector& d);
+
+  [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] State& state() { return state_; }
+  [[nodiscard]] const BodyMotion& motion() const { return motion_; }
+  [[nodiscard]] const inertial::InertialStep& last_step() const { return last_; }
+  [[nodiscard]] inertial::Earth& earth() { return earth_; }
+  [[nodiscard]] const inertial::Earth& earth() const { return earth_; }
+  /// What has moved the state since the covariance's epoch.
+  [[nodiscard]] const inertial::TransitionSums& pending() const { return sums_; }
+  /// rad, as of the covariance's epoch.
+  [[nodiscard]] double heading_std() const;
+  /// s by which measurements may be older than their stamps on the imu's clock, at three sigma.
+  [[nodiscard]] double longest_age(bool wheels) const;
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    earth_.serialise(a);
+    state_.serialise(a);
+    sums_.serialise(a);
+    last_.serialise(a);
+    a(motion_.rate, motion_.acceleration, considered_first_, considered_size_, gnss_bias_.position_std,
+      gnss_bias_.velocity_std, gnss_bias_.position_time, gnss_bias_.velocity_time);
+  }
+  void digest(Digest& digest) const { state_.digest(digest); }
+
+ private:
+  /// What a covariance step does to the base block's states that no other moves: decay and added variance.
+  struct Diagonal {
+    Eigen::Matrix<double, kWithoutCamera, 1> decay, noise;
+  };
+  [[nodiscard]] Diagonal diagonal(double T) const;
+  [[nodiscard]] inertial::ErrorTransition transition() const;
+  template <int Rows>
+  [[nodiscard]] Eigen::Matrix<double, Rows, Rows> innovation_covariance(const Measurement<Rows>& m) const;
+  template <int Rows>
+  void apply(const Measurement<Rows>& m);
+
+  NavigationConfig config_;
+  inertial::Earth earth_;
+  State state_;
+  inertial::TransitionSums sums_;
+  inertial::InertialStep last_;
+  BodyMotion motion_;
+  int considered_first_ = 0, considered_size_ = 0;
+  GnssBias gnss_bias_;
+  Eigen::VectorXd scratch_;  // a correction
+};
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,59 @@
+/// From the first samples and fixes to one filter with a known heading: which strategy starts, and the hypotheses that
+/// follow it, (N.7) of MODEL.md.
+#pragma once
+
+#include "navigation/initialisation/heading_hypotheses.h"
+#include "navigation/serialise_optional.h"
+
+namespace roadfix::navigation {
+
+enum class Phase { kWaiting, kLevelling, kHeading, kDone };
+
+class Alignment {
+ public:
+  explicit Alignment(const NavigationConfig& config) : config_(config), hypotheses_(config) {}
+
+  void see_first_sample(int64_t t_us) {
+    if (first_us_ == 0) first_us_ = t_us;
+  }
+  /// A fix that passed the screen, for the start.
+  void add(const GnssFix& fix);
+  /// At the end of a block; true: it has started, and everything stamped before begun_us() is used.
+  bool try_start(int64_t t_us, const inertial::StandstillDetector& standstill, std::optional<Geodetic>& anchor,
+                 const Eigen::Vector3d& bias_std);
+  [[nodiscard]] HeadingHypotheses& hypotheses() { return hypotheses_; }
+  [[nodiscard]] const HeadingHypotheses& hypotheses() const { return hypotheses_; }
+  [[nodiscard]] bool has_fix() const { return fix_.has_value(); }
+  [[nodiscard]] const std::optional<GnssFix>& fix() const { return fix_; }
+  [[nodiscard]] const std::optional<Memory>& memory() const { return memory_; }
+  void recall(const Memory& memory) { memory_ = memory; }
+  /// Started where it was parked, and no fix has agreed yet.
+  [[nodiscard]] bool parked() const { return parked_; }
+  void fix_agreed() { parked_ = false; }
+  /// The remembered place did not hold; sensor errors are kept.
+  void forget_place();
+
+  template <class Archive>
+  void serialise(Archive& a, const std::optional<Geodetic>& anchor);
+
+ private:
+  NavigationConfig config_;
+  HeadingHypotheses hypotheses_;
+  std::optional<GnssFix> fix_, fix_before_;
+  std::optional<Memory> memory_;
+  int64_t first_us_ = 0;
+  bool parked_ = false;
+};
+
+template <class Archive>
+void Alignment::serialise(Archive& a, const std::optional<Geodetic>& anchor) {
+  hypotheses_.serialise(a, anchor ? inertial::Earth(*anchor) : inertial::Earth());
+  for (std::optional<GnssFix>* fix : {&fix_, &fix_before_})
+    serialise_optional(
+        a, *fix, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });
+  serialise_optional(
+      a, memory_, [] { return Memory(); }, [&](Memory& m) { m.serialise(a); });
+  a(first_us_, parked_);
+}
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,46 @@
+#include "navigation/initialisation/memory.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace roadfix::navigation {
+
+namespace {
+
+// Of the spread that the calibration gives: what may be new at each start (assumed; temperature, load, tyre pressure).
+constexpr double kTurnOnChange = 0.3;
+constexpr double kMostSigmas = 5.0;  // of that spread, that a remembered value may be off
+
+Memory::Kept parameters(const Mean& x) {
+  return local(Mean(), x, Eigen::Vector3d::Zero()).segment<Memory::kKept>(Memory::kFirst);
+}
+
+}  // namespace
+
+bool Memory::sane() const {
+  return value.allFinite() && sigma.allFinite() && sigma.minCoeff() >= 0.0 && std::isfinite(place.latitude) &&
+         std::abs(place.latitude) <= 0.5 * M_PI && std::isfinite(place.longitude) && std::isfinite(place.height) &&
+         q_enu_imu.coeffs().allFinite() && std::abs(q_enu_imu.norm() - 1.0) < 1e-6 && std::isfinite(place_sigma) &&
+         place_sigma >= 0.0 && std::isfinite(heading_sigma) && heading_sigma >= 0.0;
+}
+
+void recall(const Memory& memory, Mean& x, BaseVector& std) {
+  const Memory::Kept calibrated = parameters(x);
+  BaseVector d = BaseVector::Zero();
+  for (int i = 0; i < Memory::kKept; ++i) {
+    const int at = Memory::kFirst + i;
+    const double spread = std(at);
+    d(at) = std::clamp(memory.value(i) - calibrated(i), -kMostSigmas * spread, kMostSigmas * spread);
+    std(at) = std::min(spread, std::hypot(memory.sigma(i), kTurnOnChange * spread));
+  }
+  x = retract(x, d, x.nav.position);
+}
+
+Memory remembered(const State& state) {
+  Memory memory;
+  memory.value = parameters(state.x);
+  memory.sigma = state.P().diagonal().segment<Memory::kKept>(Memory::kFirst).cwiseSqrt();
+  return memory;
+}
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,345 @@
+#include "navigation/navigation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/frames.h"
+#include "geometry/so3.h"
+#include "navigation/input_adapter.h"
+#include "stream/state_bytes.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+constexpr double kMaxLag = 1.5;              // s behind the horizon, for receivers that stamp late
+constexpr double kRealignGap = 10.0;         // s without samples; longer starts over
+constexpr double kMaxRate = 20.0;            // rad/s, more is not a car
+constexpr double kMaxForce = 200.0;          // m/s2, likewise
+constexpr double kBridgeAccel = 2.0;         // m/s2, what a car may do unseen in a gap of the imu
+constexpr double kBridgeRate = 0.2;          // rad/s
+constexpr double kClipTime = 1.0;            // s that a turn beyond the gyro's range lasts
+constexpr double kTruthShown = 3.0;          // s since the last position, to learn the constraint's noise
+constexpr double kWheelsSilent = 0.3;        // s without a wheel speed, after which the constraint keeps its own time
+constexpr double kMoving = 1.0;              // m/s
+constexpr double kWheelPeriodSlack = 0.005;  // s
+constexpr double kPredictorSpan = 1.0;       // s that one transition of the output covariance may cover
+
+bool plausible(const ImuSample& s) {
+  return s.gyro.allFinite() && s.accel.allFinite() && s.gyro.norm() < kMaxRate && s.accel.norm() < kMaxForce;
+}
+
+// The state stays behind the horizon by the longest latency that is possible yet.
+int64_t lag_of(double age_s) { return static_cast<int64_t>(1e6 * std::clamp(age_s, 0.0, kMaxLag)); }
+
+double prior_age(const VehicleFacts& v) {
+  const ClockPriors time(v);
+  return 3.0 * std::hypot(std::max(time.position_latency, time.velocity_latency), time.imu_offset);
+}
+
+}  // namespace
+
+Navigation::Navigation(const NavigationConfig& config)
+    : config_(config),
+      aiding_(config),
+      screen_(config.screen),
+      imu_noise_(config.facts.imu),
+      alignment_(config),
+      lag_us_(lag_of(prior_age(config.facts))) {
+  records_.reserve(1024);
+}
+
+InputStatus Navigation::see(const ImuSample& imu) {
+  if (!plausible(imu)) {
+    ++bad_imu_;
+    return InputStatus::kBadInput;
+  }
+  const int64_t newest = ring_.empty() ? last_step_us_ : ring_.back().t_us;
+  if (imu.t_us <= newest) return InputStatus::kOutOfOrder;
+  ring_.push(imu);
+  return InputStatus::kAccepted;
+}
+
+InputStatus Navigation::advance(const ImuSample& imu) {
+  InputStatus status = InputStatus::kAccepted;
+  const int64_t newest = ring_.empty() ? last_step_us_ : ring_.back().t_us;
+  if (imu.t_us > newest) status = see(imu);
+  while (!ring_.empty() && ring_.front().t_us <= imu.t_us - lag_us_) {
+    step(ring_.front());
+    ring_.pop();
+  }
+  return status;
+}
+
+void Navigation::add(const GnssFix& fix, int64_t id) {
+  const bool again = fix.t_us == last_fix_us_ && fix.antenna.latitude == last_fix_.latitude &&
+                     fix.antenna.longitude == last_fix_.longitude && fix.antenna.height == last_fix_.height;
+  const AidingStatus screened = again ? AidingStatus::kBadInput : screen_.check(fix);
+  if (screened != AidingStatus::kAccepted) return note(record_of(AidingSource::kGnssPosition, screened, fix.t_us, id));
+  if (!anchor_) anchor_ = fix.antenna;
+  last_fix_us_ = fix.t_us;
+  last_fix_ = fix.antenna;
+  alignment_.add(fix);
+  const QueuedFix all = queued(fix, id, EnuAnchor(*anchor_), config_);
+  for (const std::optional<Queued>& q : {all.position, all.velocity, all.heading})
+    if (q) queue_.push(*q);
+}
+
+void Navigation::add(const WheelSample& wheels, int64_t id) {
+  if (!config_.sources.wheel_speed) return;
+  const std::optional<Queued> q = queued(wheels, id, config_);
+  if (!q) return note(record_of(AidingSource::kWheelSpeed, AidingStatus::kBadInput, wheels.t_us, id));
+  if (seconds_between(last_wheel_us_, wheels.t_us) < config_.aiding.wheel_interval - kWheelPeriodSlack) return;
+  last_wheel_us_ = wheels.t_us;
+  queue_.push(*q);
+}
+
+void Navigation::add(const MagSample& mag, int64_t id) {
+  if (!config_.sources.magnetic_heading) return;
+  if (seconds_between(last_magnetic_us_, mag.t_us) < config_.aiding.magnetic_interval) return;
+  const std::optional<Queued> q = queued(mag, id, config_);
+  if (!q) return;
+  last_magnetic_us_ = mag.t_us;
+  queue_.push(*q);
+}
+
+void Navigation::note(AidingRecord record, int64_t id) {
+  if (id != 0) record.id = id;
+  if (record.status == AidingStatus::kAccepted || record.status == AidingStatus::kReset) {
+    used_at_us_[static_cast<size_t>(record.source)] = record.t_us;
+    predictor_stale_ = true;
+  }
+  if (records_.size() < records_.capacity()) records_.push_back(record);
+}
+
+void Navigation::forget_before(int64_t t_us) {
+  queue_.drop_before(t_us, [&](const Queued& q) {
+    note(record_of(Aiding::source_of(q.kind), AidingStatus::kNotReady, q.t_us), q.id);
+  });
+}
+
+inertial::ImuNoise Navigation::noise_over(double dt) const {
+  inertial::ImuNoise noise = imu_noise_.noise();
+  // White noise that over this time does what an unseen manoeuvre may do, (N.2.6).
+  if (dt > config_.process.max_gap || imu_noise_.frozen())
+    noise = {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt)};
+  if (imu_noise_.gyro_clipped()) noise.gyro = kBridgeRate * std::sqrt(kClipTime);
+  return noise;
+}
+
+void Navigation::step(const ImuSample& imu) {
+  const double dt = last_step_us_ == 0 ? 0.0 : seconds_between(last_step_us_, imu.t_us);
+  last_step_us_ = imu.t_us;
+  alignment_.see_first_sample(imu.t_us);
+  if (dt <= 0.0) return;
+  const bool gap = dt > config_.process.max_gap;
+  bool block_done = false;
+  if (!gap) {
+    imu_noise_.add(imu, dt);
+    block_done = standstill_.add(imu, dt, imu_noise_.noise(), imu_noise_.frozen());
+  } else {
+    ++gaps_;
+    // What was measured inside the gap is of a time that the state skips.
+    forget_before(imu.t_us - static_cast<int64_t>(1e6 * config_.process.max_gap));
+    aiding_.gnss_position().clear_run();
+  }
+  // While moving: a turn that nobody saw must fit into one of the start's hypotheses, or all are asked again.
+  const bool turned = kBridgeRate * dt > 2.0 * config_.start.heading_std;
+  if (dt > kRealignGap || (turned && moved_meanwhile(dt))) align_again();
+  if (phase_ == Phase::kDone) {
+    filter_->predict(imu, dt, noise_over(dt));
+    step_aligned(imu, block_done);
+    if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
+  } else if (phase_ == Phase::kHeading) {
+    step_heading(imu, dt, block_done);
+  } else {
+    phase_ = alignment_.has_fix() ? Phase::kLevelling : Phase::kWaiting;
+    if (!block_done || imu_noise_.frozen()) return;
+    const Eigen::Vector3d bias =
+        alignment_.has_fix() ? aiding_.gnss_position().lasting_std(*alignment_.fix()) : Eigen::Vector3d::Zero();
+    if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias)) return;
+    // What is older made the start, or lies too far back to be carried over an unknown acceleration.
+    forget_before(imu.t_us + 1);
+    predictor_stale_ = true;
+    predictor_.emplace(alignment_.hypotheses().leader().earth());
+    phase_ = Phase::kHeading;
+  }
+}
+
+void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) {
+  HeadingHypotheses& all = alignment_.hypotheses();
+  all.predict(imu, dt, noise_over(dt));
+  const auto mean = [&]() -> const Mean& { return all.leader().state().x; };
+  queue_.take_due(mean, [&](const Queued& q) {
+    note(all.aid([&](Filter& f) { return aiding_.try_on(f, q); }), q.id);
+    if (q.kind == Queued::Kind::kPosition) {
+      aiding_.gnss_position().tried(q);
+      alignment_.fix_agreed();
+    }
+  });
+  for (const int axis : {1, 2})
+    if (aiding_.nonholonomic().due(axis, imu.t_us))
+      note(all.aid([&](Filter& f) { return aiding_.nonholonomic().try_on(f, axis); }));
+  if (block_done && aiding_.zero_motion().standing(all.leader(), standstill_, imu_noise_.frozen())) {
+    note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_velocity(f, false); }));
+    note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_rate(f, standstill_.block(), false); }));
+  }
+  if (abandoned_ && usable()) count_reset(*abandoned_, all.leader().state().x);
+  if (block_done && all.confirmed()) end_alignment();
+}
+
+void Navigation::end_alignment() {
+  HeadingHypotheses& all = alignment_.hypotheses();
+  filter_.emplace(all.leader());
+  filter_->consider(0, 0);
+  all.stop();
+  phase_ = Phase::kDone;
+  predictor_stale_ = true;
+  if (abandoned_) count_reset(*abandoned_, filter_->state().x);
+}
+
+void Navigation::align_again() {
+  if (usable()) abandoned_ = SE3{filter()->state().x.nav.q_level_imu, filter()->state().x.nav.position};
+  phase_ = Phase::kWaiting;
+  filter_.reset();
+  predictor_.reset();
+  alignment_.hypotheses().stop();
+  alignment_.forget_place();
+  queue_.clear();
+  aiding_.gnss_position().clear_run();
+  predictor_stale_ = true;
+  lag_us_ = lag_of(prior_age(config_.facts));
+}
+
+void Navigation::step_aligned(const ImuSample& imu, bool block_done) {
+  Filter& filter = *filter_;
+  bool wheels = false;
+  queue_.take_due([&]() -> const Mean& { return filter.state().x; },
+                  [&](const Queued& q) {
+                    wheels = wheels || q.kind == Queued::Kind::kWheels;
+                    use(q);
+                  });
+  if (wheels) wheels_at_us_ = imu.t_us;
+  // Where wheel speeds come, the constraint joins them: one epoch of updates instead of two.
+  if (wheels || seconds_between(wheels_at_us_, imu.t_us) > kWheelsSilent) {
+    const bool learn = seconds_between(used_at_us_[0], imu.t_us) < kTruthShown;
+    for (const int axis : {1, 2})
+      if (aiding_.nonholonomic().due(axis, imu.t_us)) note(aiding_.nonholonomic().use(filter, axis, learn));
+  }
+  if (block_done && aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen())) {
+    note(aiding_.zero_motion().use_velocity(filter, true));
+    note(aiding_.zero_motion().use_rate(filter, standstill_.block(), true));
+  }
+}
+
+void Navigation::use(const Queued& q) {
+  const SE3 before{filter_->state().x.nav.q_level_imu, filter_->state().x.nav.position};
+  const AidingRecord r = aiding_.use(*filter_, q);
+  note(r, q.id);
+  if (q.kind != Queued::Kind::kPosition) return;
+  if (r.status == AidingStatus::kAccepted) alignment_.fix_agreed();
+  if (r.status == AidingStatus::kReset) count_reset(before, filter_->state().x);
+}
+
+void Navigation::count_reset(const SE3& before, const Mean& after) {
+  ++reset_counter_;
+  reset_delta_.p = after.nav.position - before.p;
+  reset_delta_.q = before.q.conjugate() * after.nav.q_level_imu;
+  abandoned_.reset();
+}
+
+bool Navigation::moved_meanwhile(double dt) const {
+  if (filter() == nullptr) return false;
+  const Mean& before = filter()->state().x;
+  if (before.nav.velocity.norm() > kMoving) return true;
+  const std::optional<GnssFix>& fix = alignment_.fix();
+  if (!fix || !anchor_ || fix->t_us <= before.t_us) return false;
+  const Eigen::Vector3d way = EnuAnchor(*anchor_).enu(fix->antenna) - before.nav.position;
+  return way.head<2>().norm() > kMoving * dt + 3.0 * std::sqrt(fix->cov_enu(0, 0) + fix->cov_enu(1, 1));
+}
+
+const Filter* Navigation::filter() const {
+  if (phase_ == Phase::kDone) return &*filter_;
+  return phase_ == Phase::kHeading ? &alignment_.hypotheses().leader() : nullptr;
+}
+
+bool Navigation::usable() const {
+  if (phase_ != Phase::kHeading) return phase_ == Phase::kDone;
+  return alignment_.hypotheses().heading_std() < config_.start.confirm_std;
+}
+
+void Navigation::rebase_predictor() {
+  const double span = kPredictorSpan + 1e-6 * static_cast<double>(lag_us_);
+  const bool far = predictor_->begun() && seconds_between(predictor_->begun_at_us(), last_step_us_) > span;
+  if (predictor_stale_ || !predictor_->begun() || predictor_->next() < ring_.begin() || far) {
+    if (phase_ == Phase::kHeading) {
+      Filter merged(config_, alignment_.hypotheses().leader().earth(), false);
+      alignment_.hypotheses().merge_into(merged);
+      predictor_->begin(merged, ring_.begin());
+    } else {
+      predictor_->begin(*filter_, ring_.begin());
+    }
+    predictor_stale_ = false;
+  }
+  predictor_->carry(ring_, [&](double dt) { return noise_over(dt); });
+}
+
+void Navigation::recall(const Memory& memory) {
+  if (filter() == nullptr && memory.sane()) alignment_.recall(memory);
+}
+
+std::optional<Memory> Navigation::memory() const {
+  if (phase_ != Phase::kDone || !anchor_) return std::nullopt;
+  constexpr double kParkedSigma = 10.0;  // m; a place known worse is not worth keeping
+  const EnuAnchor enu(*anchor_);
+  const State& s = filter_->state();
+  Memory m = remembered(s);
+  m.place = enu.geodetic(s.x.nav.position);
+  m.q_enu_imu = normalized_positive(Eigen::Quaterniond(enu.R_anchor_enu_at(m.place).transpose()) * s.x.nav.q_level_imu);
+  m.place_sigma = std::sqrt(s.P()(kPos, kPos) + s.P()(kPos + 1, kPos + 1));
+  m.heading_sigma = filter_->heading_std();
+  m.parked = aiding_.zero_motion().standing(*filter_, standstill_, imu_noise_.frozen()) &&
+             m.heading_sigma < config_.start.confirm_std && m.place_sigma < kParkedSigma;
+  return m;
+}
+
+template <class Archive>
+void Navigation::serialise(Archive& a) {
+  serialise_optional(
+      a, anchor_, [] { return Geodetic(); }, [&](Geodetic& g) { a(g.latitude, g.longitude, g.height); });
+  const inertial::Earth earth = anchor_ ? inertial::Earth(*anchor_) : inertial::Earth();
+  serialise_optional(
+      a, filter_, [&] { return Filter(config_, earth, false); }, [&](Filter& f) { f.serialise(a); });
+  serialise_optional(
+      a, predictor_, [&] { return OutputPredictor(earth); }, [&](OutputPredictor& p) { p.serialise(a); });
+  alignment_.serialise(a, anchor_);
+  aiding_.serialise(a);
+  screen_.serialise(a);
+  imu_noise_.serialise(a);
+  standstill_.serialise(a);
+  ring_.serialise(a);
+  queue_.serialise(a);
+  serialise_optional(
+      a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
+  a(phase_, predictor_stale_, lag_us_, last_step_us_, last_wheel_us_, wheels_at_us_, last_magnetic_us_, last_fix_us_,
+    last_fix_.latitude, last_fix_.longitude, last_fix_.height, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
+    bad_imu_, gaps_);
+  for (int64_t& t : used_at_us_) a(t);
+}
+
+std::vector<uint8_t> Navigation::save() const {
+  StateArchiveOut writer;
+  // The writer only reads: serialise() is one list for both directions and so cannot be const.
+  const_cast<Navigation*>(this)->serialise(writer);
+  return writer.out.take();
+}
+
+void Navigation::load(std::span<const uint8_t> bytes) {
+  Navigation fresh(config_);
+  StateArchiveIn reader{StateReader(bytes)};
+  fresh.serialise(reader);
+  reader.in.finish();
+  *this = std::move(fresh);
+}
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,120 @@
+/// The navigation filter: one error state and one covariance for GNSS, imu, wheels and camera. Derivation:
+/// lib/navigation/MODEL.md.
+///
+/// Frames: level is enu at the first good fix (or at the remembered place); imu axes x forward, y left, z up; vehicle
+/// axes differ from the imu's by the mounting angles.
+/// Time: inputs come in the order of their stamps as the caller's horizon passes them (advance, add); see() hands in
+/// the newest imu sample ahead of the horizon, and output() is for that one. The state stays behind the horizon by the
+/// longest latency that is possible yet, so that every measurement is used at its own moment.
+/// Guarantees: same inputs in the same order give the same bits; no allocation once aligned; one thread.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "navigation/aiding/aiding.h"
+#include "navigation/aiding/gnss_screen.h"
+#include "navigation/initialisation/alignment.h"
+#include "navigation/output_predictor.h"
+
+namespace roadfix::navigation {
+
+enum class InputStatus { kAccepted, kBadInput, kOutOfOrder };
+
+struct NavigationStatus {
+  Phase phase = Phase::kWaiting;
+  std::string waits_for;  ///< plain words; empty once aligned
+  int aided_by = 0;       ///< bit i: AidingSource i used within its last coasting time
+  bool coasting = false;
+  int64_t coasting_since_us = 0;
+  GnssQuality gnss_quality = GnssQuality::kAbsent;
+  std::string gnss_reason;
+  int64_t bad_imu_samples = 0;
+  bool imu_frozen = false;
+  int64_t imu_gaps = 0;
+  int64_t wheel_scale_steps = 0;  ///< after which the scale was estimated anew
+};
+
+struct NavigationOutput {
+  Phase phase = Phase::kWaiting;
+  Odometry odometry;   ///< imu origin and axes in the level frame
+  std::string reason;  ///< plain words, empty when all is well
+  int reset_counter = 0;
+  SE3 reset_delta;  ///< of the last jump: p new minus old; q_old^-1 q_new
+};
+
+class Navigation {
+ public:
+  explicit Navigation(const NavigationConfig& config);
+
+  InputStatus see(const ImuSample& imu);      ///< newest sample, ahead of the horizon
+  InputStatus advance(const ImuSample& imu);  ///< the horizon has passed this sample
+  void add(const GnssFix& fix, int64_t id = 0);
+  void add(const WheelSample& wheels, int64_t id = 0);
+  void add(const MagSample& mag, int64_t id = 0);
+
+  /// Nothing before the first fix.
+  [[nodiscard]] std::optional<Geodetic> anchor() const { return anchor_; }
+  /// What an earlier drive left, before the first start of this one; later it changes nothing.
+  void recall(const Memory& memory);
+  /// What this drive leaves to the next; nothing until aligned.
+  [[nodiscard]] std::optional<Memory> memory() const;
+
+  [[nodiscard]] NavigationOutput output();
+  [[nodiscard]] NavigationStatus status() const;
+  /// Filter in use (the leading hypothesis while aligning); nothing before alignment starts.
+  [[nodiscard]] const Filter* filter() const;
+  /// What was tried since the last call to clear_records().
+  [[nodiscard]] const std::vector<AidingRecord>& records() const { return records_; }
+  void clear_records() { records_.clear(); }
+
+  /// Everything that later outputs depend on; load() throws std::runtime_error on bytes that are no such state.
+  [[nodiscard]] std::vector<uint8_t> save() const;
+  void load(std::span<const uint8_t> bytes);
+
+ private:
+  void step(const ImuSample& imu);
+  void step_aligned(const ImuSample& imu, bool block_done);
+  void step_heading(const ImuSample& imu, double dt, bool block_done);
+  void use(const Queued& q);
+  void align_again();
+  void end_alignment();
+  void note(AidingRecord record, int64_t id = 0);
+  void forget_before(int64_t t_us);
+  [[nodiscard]] inertial::ImuNoise noise_over(double dt) const;
+  [[nodiscard]] bool usable() const;
+  [[nodiscard]] std::optional<int64_t> coasting_since() const;
+  [[nodiscard]] bool moved_meanwhile(double dt) const;
+  void count_reset(const SE3& before, const Mean& after);
+  void rebase_predictor();
+  template <class Archive>
+  void serialise(Archive& a);
+
+  NavigationConfig config_;
+  Aiding aiding_;
+  GnssScreen screen_;
+  inertial::ImuNoiseEstimator imu_noise_;
+  inertial::StandstillDetector standstill_;
+  inertial::ImuRing ring_;
+  MeasurementQueue queue_;
+  Alignment alignment_;
+  std::optional<Geodetic> anchor_;
+  std::optional<Filter> filter_;
+  std::optional<OutputPredictor> predictor_;
+  Phase phase_ = Phase::kWaiting;
+  bool predictor_stale_ = true;
+  int64_t lag_us_ = 0, last_step_us_ = 0;
+  int64_t last_wheel_us_ = 0, wheels_at_us_ = 0, last_magnetic_us_ = 0, last_fix_us_ = 0;
+  Geodetic last_fix_;
+  std::array<int64_t, kAidingSources> used_at_us_{};
+  std::optional<SE3> abandoned_;  // last pose of a filter that was given up
+  int reset_counter_ = 0;
+  SE3 reset_delta_;
+  int64_t bad_imu_ = 0, gaps_ = 0;
+  std::vector<AidingRecord> records_;
+};
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,254 @@
+#include "navigation/state.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "geometry/so3.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+Eigen::Vector3d part(const Eigen::Ref<const Eigen::VectorXd>& d, int at) { return d.segment<3>(at); }
+
+void retract_base(Mean& x, const Eigen::Ref<const Eigen::VectorXd>& d, const Eigen::Vector3d& p_ref, bool camera) {
+  const Eigen::Quaterniond dq = exp_q(part(d, kAtt));
+  x.nav.q_level_imu = (dq * x.nav.q_level_imu).normalized();
+  x.nav.velocity = dq * x.nav.velocity + part(d, kVel);
+  x.nav.position = p_ref + dq * (x.nav.position - p_ref) + part(d, kPos);
+  x.gyro_bias += part(d, kGyroBias);
+  x.accel_bias += part(d, kAccelBias);
+  x.gyro_scale += part(d, kGyroScale);
+  x.accel_scale += part(d, kAccelScale);
+  x.wheel_scale += d(kWheelScale);
+  x.mounting += d.segment<2>(kMounting);
+  x.p_imu_axle += part(d, kAxle);
+  x.p_imu_antenna += part(d, kAntenna);
+  x.position_latency += d(kPositionLatency);
+  x.velocity_latency += d(kVelocityLatency);
+  x.imu_offset += d(kImuOffset);
+  x.wheel_latency += d(kWheelLatency);
+  x.gnss_bias += part(d, kGnssBias);
+  x.gnss_velocity_bias += part(d, kGnssVelocityBias);
+  if (!camera) return;
+  x.T_imu_camera.q = (x.T_imu_camera.q * exp_q(part(d, kCameraTurn))).normalized();
+  x.T_imu_camera.p += part(d, kCameraPlace);
+  x.T_left_right.q = (x.T_left_right.q * exp_q(part(d, kRightTurn))).normalized();
+  x.lens += part(d, kLens);
+  x.camera_offset += d(kCameraOffset);
+}
+
+}  // namespace
+
+inertial::InertialStep Mean::corrected(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, double dt) const {
+  inertial::InertialStep s;
+  s.dt = dt;
+  s.rate = (gyro - gyro_bias).cwiseProduct((1.0 - gyro_scale.array()).matrix());
+  s.specific_force = (accel - accel_bias).cwiseProduct((1.0 - accel_scale.array()).matrix());
+  return s;
+}
+
+Mean retract(const Mean& x, const BaseVector& d, const Eigen::Vector3d& p_ref) {
+  Mean y = x;
+  retract_base(y, d, p_ref, true);
+  return y;
+}
+
+BaseVector local(const Mean& x, const Mean& y, const Eigen::Vector3d& p_ref) {
+  BaseVector d;
+  const Eigen::Quaterniond dq = y.nav.q_level_imu * x.nav.q_level_imu.conjugate();
+  d.segment<3>(kAtt) = log_q(dq);
+  d.segment<3>(kVel) = y.nav.velocity - dq * x.nav.velocity;
+  d.segment<3>(kPos) = y.nav.position - p_ref - dq * (x.nav.position - p_ref);
+  d.segment<3>(kGyroBias) = y.gyro_bias - x.gyro_bias;
+  d.segment<3>(kAccelBias) = y.accel_bias - x.accel_bias;
+  d.segment<3>(kGyroScale) = y.gyro_scale - x.gyro_scale;
+  d.segment<3>(kAccelScale) = y.accel_scale - x.accel_scale;
+  d(kWheelScale) = y.wheel_scale - x.wheel_scale;
+  d.segment<2>(kMounting) = y.mounting - x.mounting;
+  d.segment<3>(kAxle) = y.p_imu_axle - x.p_imu_axle;
+  d.segment<3>(kAntenna) = y.p_imu_antenna - x.p_imu_antenna;
+  d(kPositionLatency) = y.position_latency - x.position_latency;
+  d(kVelocityLatency) = y.velocity_latency - x.velocity_latency;
+  d(kImuOffset) = y.imu_offset - x.imu_offset;
+  d(kWheelLatency) = y.wheel_latency - x.wheel_latency;
+  d.segment<3>(kGnssBias) = y.gnss_bias - x.gnss_bias;
+  d.segment<3>(kGnssVelocityBias) = y.gnss_velocity_bias - x.gnss_velocity_bias;
+  d.segment<3>(kCameraTurn) = log_q(x.T_imu_camera.q.conjugate() * y.T_imu_camera.q);
+  d.segment<3>(kCameraPlace) = y.T_imu_camera.p - x.T_imu_camera.p;
+  d.segment<3>(kRightTurn) = log_q(x.T_left_right.q.conjugate() * y.T_left_right.q);
+  d.segment<3>(kLens) = y.lens - x.lens;
+  d(kCameraOffset) = y.camera_offset - x.camera_offset;
+  return d;
+}
+
+State::State(bool camera)
+    : base_(camera ? kBaseSize : kWithoutCamera),
+      size_(base_),
+      P_(Eigen::MatrixXd::Zero(camera ? kMaxSize : kWithoutCamera, camera ? kMaxSize : kWithoutCamera)),
+      expected_(Eigen::VectorXd::Zero(P_.rows())) {
+  if (!camera) return;
+  clones.reserve(kMaxClones);
+  points.reserve(kMaxPoints);
+}
+
+const Clone* State::find_clone(int64_t id) const {
+  const auto found =
+      std::lower_bound(clones.begin(), clones.end(), id, [](const Clone& c, int64_t wanted) { return c.id < wanted; });
+  return found != clones.end() && found->id == id ? &*found : nullptr;
+}
+
+void State::reset(const Mean& mean, const BaseVector& variance) {
+  x = mean;
+  p_ref = mean.nav.position;
+  clones.clear();
+  points.clear();
+  size_ = base_;
+  P_.setZero();
+  P_.diagonal().head(base_) = variance.head(base_);
+  expected_.setZero();
+  held_ = false;
+}
+
+void State::drop_clones() {
+  clones.clear();
+  points.clear();
+  size_ = base_;
+}
+
+void State::correct(const Eigen::VectorXd& d) {
+  if (held_) {
+    expected_.head(size_) += d.head(size_);
+  } else {
+    retract(d);
+  }
+}
+
+void State::hold(const BaseVector& base) {
+  held_ = true;
+  expected_.setZero();
+  expected_.head(base_) = base.head(base_);
+}
+
+void State::release() {
+  if (!held_) return;
+  held_ = false;
+  retract(expected_);
+  expected_.setZero();
+}
+
+void State::retract(const Eigen::VectorXd& d) {
+  retract_base(x, d, p_ref, has_camera());
+  for (Clone& c : clones) {
+    const Eigen::Matrix3d dR = exp_so3(part(d, c.at));
+    c.R = Eigen::Quaterniond(dR * c.R).normalized().toRotationMatrix();
+    c.p = p_ref + dR * (c.p - p_ref) + part(d, c.at + 3);
+  }
+  for (Point& p : points) p.f += part(d, p.at);
+}
+
+void State::subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y) {
+  if (Y.cols() <= 3) {  // an element and its mirror are the same sum of the same products, none of them fused
+    for (int j = 0; j < size_; ++j)
+      for (int r = 0; r < Y.cols(); ++r) P_.col(j).head(size_) -= Y(j, r) * Y.col(r).head(size_);
+    mirror();
+    return;
+  }
+  P_.topLeftCorner(size_, size_).selfadjointView<Eigen::Lower>().rankUpdate(Y, -1.0);
+  mirror();
+}
+
+void State::mirror() {
+  for (int j = 1; j < size_; ++j)
+    for (int i = 0; i < j; ++i) P_(i, j) = P_(j, i);
+}
+
+void State::move_reference(const Eigen::Vector3d& p) {
+  const Eigen::Matrix3d D = skew(p - p_ref);
+  p_ref = p;
+  const auto move = [&](int att, int pos) {  // T P T', T: rho -= [p_new - p_old]x phi
+    P_.block(pos, 0, 3, size_) -= D * P_.block(att, 0, 3, size_).eval();
+    P_.block(0, pos, size_, 3) -= P_.block(0, att, size_, 3).eval() * D.transpose();
+    if (held_) expected_.segment<3>(pos) -= D * expected_.segment<3>(att);
+  };
+  move(kAtt, kPos);
+  for (const Clone& c : clones) move(c.at, c.at + 3);
+  mirror();
+}
+
+int State::grow(int width) {
+  const int at = size_;
+  size_ += width;
+  P_.block(at, 0, width, size_).setZero();
+  P_.block(0, at, size_, width).setZero();
+  expected_.segment(at, width).setZero();
+  return at;
+}
+
+void State::erase(int at, int width) {
+  const int behind = size_ - at - width;
+  for (int j = at; j < at + behind; ++j) P_.col(j).head(size_) = P_.col(j + width).head(size_);
+  for (int j = 0; j < size_ - width; ++j) {
+    double* column = P_.col(j).data();
+    std::memmove(column + at, column + at + width, static_cast<size_t>(behind) * sizeof(double));
+  }
+  for (int j = at; j < at + behind; ++j) expected_(j) = expected_(j + width);
+  size_ -= width;
+  const auto moved = [&](int& a) { a = a > at ? a - width : a; };
+  for (Clone& c : clones) moved(c.at);
+  for (Point& p : points) moved(p.at);
+}
+
+void State::remove_clone(int64_t id) {
+  const auto found = std::find_if(clones.begin(), clones.end(), [&](const Clone& c) { return c.id == id; });
+  const int at = found->at;
+  clones.erase(found);
+  erase(at, 6);
+}
+
+void State::remove_point(int64_t track) {
+  const auto found = std::find_if(points.begin(), points.end(), [&](const Point& p) { return p.track == track; });
+  const int at = found->at;
+  points.erase(found);
+  erase(at, 3);
+}
+
+void State::add_clone(int64_t id, const Eigen::Vector3d& rate, double jitter) {
+  const Eigen::Vector3d w = x.nav.q_level_imu * rate;
+  Vector6d J_time;  // of (phi, rho) by the moment of the picture
+  J_time << w, x.nav.velocity - w.cross(x.nav.position - p_ref);
+  const int old = size_;
+  const int at = grow(6);
+  Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxSize> rows(6, old);
+  rows.topRows<3>() = P_.block(kAtt, 0, 3, old);
+  rows.bottomRows<3>() = P_.block(kPos, 0, 3, old);
+  for (int j = 0; j < old; ++j) rows.col(j) += J_time * P_(kCameraOffset, j);
+  Matrix6d own;
+  own.leftCols<3>() = rows.middleCols<3>(kAtt);
+  own.rightCols<3>() = rows.middleCols<3>(kPos);
+  own += rows.col(kCameraOffset) * J_time.transpose();
+  own += jitter * jitter * J_time * J_time.transpose();
+  P_.block(at, 0, 6, old) = rows;
+  P_.block(0, at, old, 6) = rows.transpose();
+  P_.block<6, 6>(at, at) = 0.5 * (own + own.transpose());
+  if (held_) {
+    expected_.segment<3>(at) = expected_.segment<3>(kAtt);
+    expected_.segment<3>(at + 3) = expected_.segment<3>(kPos);
+    expected_.segment<6>(at) += J_time * expected_(kCameraOffset);
+  }
+  clones.push_back({id, x.t_us, at, x.R(), x.nav.position});
+}
+
+void State::digest(Digest& digest) const {
+  digest.add(x.t_us);
+  digest.add(local(Mean(), x, Eigen::Vector3d::Zero()));
+  digest.add(Eigen::Vector4d(x.nav.q_level_imu.coeffs()));
+  for (const Clone& c : clones) {
+    digest.add(c.R);
+    digest.add(c.p);
+  }
+  for (const Point& p : points) digest.add(p.f);
+  digest.add(Eigen::MatrixXd(P_.topLeftCorner(size_, size_)));
+}
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,191 @@
+/// State of the navigation filter: means, one covariance, and the poses and points that come and go in it, (N.1) of
+/// MODEL.md.
+///
+/// Frame level: enu at an anchor, or local (z up) before fixes tie it. Error of every pose (R, p), right-invariant
+/// about the reference point p_ref: R = Exp(phi) R_hat, p = p_ref + Exp(phi) (p_hat - p_ref) + rho, phi and rho in
+/// level axes; velocity v = Exp(phi) v_hat + nu, (N.1.2). The camera's rotation has its error on the right; all else is
+/// additive. The covariance is symmetric to the bit. Memory is taken once, at construction.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "geometry/se3.h"
+#include "inertial/error_transition.h"
+#include "stream/digest.h"
+
+namespace roadfix::navigation {
+
+inline constexpr int kMaxClones = 17;
+inline constexpr int kMaxPoints = 40;
+
+using inertial::kAccelBias;
+using inertial::kAccelScale;
+using inertial::kAtt;
+using inertial::kGyroBias;
+using inertial::kGyroScale;
+using inertial::kInertialSize;
+using inertial::kPos;
+using inertial::kVel;
+
+/// Where the error of what stands in the covariance, behind the inertial block. Clones and points follow.
+inline constexpr int kWheelScale = 21;        ///< measured speed over true speed, minus one
+inline constexpr int kMounting = 22;          ///< rad, pitch and yaw of the vehicle's axes in the imu's
+inline constexpr int kAxle = 24;              ///< m, imu axes: the point that does not slip
+inline constexpr int kAntenna = 27;           ///< m, imu axes: phase centre
+inline constexpr int kPositionLatency = 30;   ///< s, age of a GNSS position at its stamp
+inline constexpr int kVelocityLatency = 31;   ///< s, age of a GNSS velocity at its stamp
+inline constexpr int kImuOffset = 32;         ///< s, imu stamp minus true time
+inline constexpr int kWheelLatency = 33;      ///< s, age of a wheel speed at its stamp
+inline constexpr int kGnssBias = 34;          ///< m, Gauss-Markov error of GNSS positions, level axes
+inline constexpr int kGnssVelocityBias = 37;  ///< m/s, likewise of GNSS velocities
+inline constexpr int kWithoutCamera = 40;
+inline constexpr int kCameraTurn = 40;    ///< rad, of the left camera in the imu, camera axes
+inline constexpr int kCameraPlace = 43;   ///< m, imu axes
+inline constexpr int kLens = 46;          ///< of the left camera, (N.6.9)
+inline constexpr int kRightTurn = 49;     ///< rad, of the right camera against the left one, right camera's axes
+inline constexpr int kCameraOffset = 52;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
+inline constexpr int kBaseSize = 53;
+inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxPoints;
+inline constexpr int kGnssStates = kWithoutCamera - kAntenna;
+
+using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
+
+/// Means of the base block.
+struct Mean {
+  int64_t t_us = 0;                                     ///< stamp of the last imu sample, the imu's clock
+  inertial::Strapdown nav;                              ///< attitude, velocity, position
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();  ///< rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Zero();  ///< reading = (1 + scale) true + bias
+  Eigen::Vector3d accel_scale = Eigen::Vector3d::Zero();
+  double wheel_scale = 0.0;
+  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();
+  Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();
+  double position_latency = 0.0, velocity_latency = 0.0, imu_offset = 0.0, wheel_latency = 0.0;
+  Eigen::Vector3d gnss_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gnss_velocity_bias = Eigen::Vector3d::Zero();
+  SE3 T_imu_camera;
+  SE3 T_left_right;  ///< right camera's coordinates to the left one's; the place is exact
+  Eigen::Vector3d lens = Eigen::Vector3d::Zero();
+  double camera_offset = 0.0;
+
+  [[nodiscard]] Eigen::Matrix3d R() const { return nav.q_level_imu.toRotationMatrix(); }
+  /// Sensor readings with the estimated errors taken out, (N.2.1).
+  [[nodiscard]] inertial::InertialStep corrected(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel,
+                                                 double dt) const;
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    a(t_us, nav.q_level_imu.coeffs(), nav.velocity, nav.position, gyro_bias, accel_bias, gyro_scale, accel_scale,
+      wheel_scale, mounting, p_imu_axle, p_imu_antenna, position_latency, velocity_latency, imu_offset, wheel_latency,
+      gnss_bias, gnss_velocity_bias, T_imu_camera.q.coeffs(), T_imu_camera.p, T_left_right.q.coeffs(), T_left_right.p,
+      lens, camera_offset);
+  }
+};
+
+/// x with the error d about p_ref, (N.1.2), and its inverse: retract(x, local(x, y, p), p) == y.
+Mean retract(const Mean& x, const BaseVector& d, const Eigen::Vector3d& p_ref);
+BaseVector local(const Mean& x, const Mean& y, const Eigen::Vector3d& p_ref);
+
+/// The imu's pose when a picture was taken.
+struct Clone {
+  int64_t id = 0;                                   ///< counts pictures
+  int64_t t_us = 0;                                 ///< the imu's clock
+  int at = 0;                                       ///< first index of its error (phi, rho)
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< imu to level
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+};
+
+/// A point that stays in the state: seen from its anchor's camera at (alpha, beta, 1) / inverse depth.
+struct Point {
+  int64_t track = 0;
+  int64_t anchor = 0;  ///< id of a clone
+  int at = 0;
+  Eigen::Vector3d f = Eigen::Vector3d::Zero();  ///< alpha, beta, inverse depth
+};
+
+class State {
+ public:
+  /// Without a camera the base block ends at kWithoutCamera and no pose or point can be added.
+  explicit State(bool camera);
+
+  Mean x;
+  Eigen::Vector3d p_ref = Eigen::Vector3d::Zero();  ///< m, of the error; changed by move_reference() alone
+  std::vector<Clone> clones;                        ///< ascending id
+  std::vector<Point> points;                        ///< ascending track
+
+  [[nodiscard]] bool has_camera() const { return base_ == kBaseSize; }
+  [[nodiscard]] int base_size() const { return base_; }
+  [[nodiscard]] int size() const { return size_; }
+  /// The leading size() rows and columns count.
+  [[nodiscard]] const Eigen::MatrixXd& P() const { return P_; }
+  [[nodiscard]] Eigen::MatrixXd& P() { return P_; }
+  [[nodiscard]] const Clone& clone(int64_t id) const { return *find_clone(id); }
+  [[nodiscard]] const Clone* find_clone(int64_t id) const;
+
+  /// Starts with these variances of the base block; poses and points are dropped, p_ref is the position.
+  void reset(const Mean& mean, const BaseVector& variance);
+  /// Drops poses and points.
+  void drop_clones();
+
+  /// Adds the error d (size()) to every mean, (N.1.2).
+  void retract(const Eigen::VectorXd& d);
+  /// Adds the error d to the means or, while they are held, to expected().
+  void correct(const Eigen::VectorXd& d);
+
+  /// From here on corrections are kept apart and the means stay a fixed course of linearisation (iterated smoothing of
+  /// a start in motion); `base` is what the base block's error is expected to be. release() adds everything up.
+  void hold(const BaseVector& base);
+  void release();
+  [[nodiscard]] bool held() const { return held_; }
+  [[nodiscard]] const Eigen::VectorXd& expected() const { return expected_; }
+  [[nodiscard]] Eigen::VectorXd& expected() { return expected_; }
+
+  /// P -= Y Y', Y with size() rows, symmetric to the bit.
+  void subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y);
+  /// Expresses all errors about p, (N.1.5).
+  void move_reference(const Eigen::Vector3d& p);
+
+  /// Room for a block of `width` at the end, its rows and columns zero; its first index.
+  int grow(int width);
+  void remove_clone(int64_t id);
+  void remove_point(int64_t track);
+  /// Copies the pose as it is now; `rate`: rad/s, imu axes; stamps jitter by `jitter` s, (N.6.1).
+  void add_clone(int64_t id, const Eigen::Vector3d& rate, double jitter);
+
+  void digest(Digest& digest) const;
+  template <class Archive>
+  void serialise(Archive& a);
+
+ private:
+  void erase(int at, int width);
+  void mirror();
+
+  int base_;
+  int size_;
+  Eigen::MatrixXd P_;
+  Eigen::VectorXd expected_;
+  bool held_ = false;
+};
+
+template <class Archive>
+void State::serialise(Archive& a) {
+  x.serialise(a);
+  auto num_clones = static_cast<int64_t>(clones.size()), num_points = static_cast<int64_t>(points.size());
+  a(p_ref, size_, held_, num_clones, num_points);
+  if (num_clones < 0 || num_clones > kMaxClones || num_points < 0 || num_points > kMaxPoints ||
+      size_ != base_ + 6 * num_clones + 3 * num_points || size_ > P_.rows())
+    throw std::runtime_error("state: impossible size of the covariance");
+  clones.resize(static_cast<size_t>(num_clones));
+  points.resize(static_cast<size_t>(num_points));
+  for (Clone& c : clones) a(c.id, c.t_us, c.at, c.R, c.p);
+  for (Point& p : points) a(p.track, p.anchor, p.at, p.f);
+  for (int j = 0; j < size_; ++j) {
+    a(expected_(j));
+    for (int i = 0; i < size_; ++i) a(P_(i, j));
+  }
+}
+
+}  // namespace roadfix::navigation

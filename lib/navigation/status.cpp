@@ -1,0 +1,87 @@
+// What is published: the predicted pose with its validity, and the status in words.
+#include <algorithm>
+#include <cmath>
+
+#include "navigation/navigation.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+constexpr char kHeadingRoughly[] = "the heading is known roughly";
+constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is taken for an error of the receiver";
+
+const char* waiting_for(Phase phase, bool has_imu, bool has_fix) {
+  switch (phase) {
+    case Phase::kDone:
+      return "";
+    case Phase::kHeading:
+      return "heading: drive, with turns or changes of speed";
+    case Phase::kLevelling:
+      return "levelling: a second fix and calm samples";
+    case Phase::kWaiting:
+      break;
+  }
+  if (!has_imu) return "IMU samples";
+  return has_fix ? "levelling" : "a GNSS fix";
+}
+
+}  // namespace
+
+NavigationOutput Navigation::output() {
+  NavigationOutput out;
+  out.phase = phase_;
+  out.reset_counter = reset_counter_;
+  out.reset_delta = reset_delta_;
+  out.odometry.t_us = ring_.empty() ? last_step_us_ : ring_.back().t_us;
+  const char* waits = waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
+  if (filter() == nullptr) {
+    out.reason = std::string("waits for ") + waits;
+    return out;
+  }
+  rebase_predictor();
+  out.odometry = predictor_->output();
+  const double horizontal = std::sqrt(out.odometry.cov_pose(0, 0) + out.odometry.cov_pose(1, 1));
+  if (!usable()) {
+    out.reason = std::string("waits for ") + waits;
+  } else if (!(horizontal < config_.start.invalid_sigma_m)) {
+    out.reason = "position too uncertain";
+  } else {
+    const bool coasting = coasting_since().has_value();
+    if (phase_ == Phase::kHeading) out.reason = kHeadingRoughly;
+    out.odometry.validity = coasting || alignment_.parked() ? Validity::kCoasting : Validity::kValid;
+    if (coasting) out.reason = "coasting without GNSS";
+    if (alignment_.parked()) out.reason = "from the place where it was parked, without GNSS yet";
+    if (aiding_.gnss_position().height_differs()) out.reason = kHeightContradicts;
+    if (imu_noise_.frozen()) out.reason = "IMU readings do not change";
+  }
+  return out;
+}
+
+std::optional<int64_t> Navigation::coasting_since() const {
+  const auto used_at = [&](AidingSource source) { return used_at_us_[static_cast<size_t>(source)]; };
+  const int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
+  const bool coasting = usable() && seconds_between(anchored, last_step_us_) > config_.start.coasting_s;
+  return coasting ? std::optional(anchored) : std::nullopt;
+}
+
+NavigationStatus Navigation::status() const {
+  NavigationStatus s;
+  s.phase = phase_;
+  s.waits_for = waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
+  s.gnss_quality = screen_.quality();
+  s.gnss_reason = screen_.reason();
+  if (s.gnss_reason.empty() && aiding_.gnss_position().height_differs()) s.gnss_reason = kHeightContradicts;
+  s.bad_imu_samples = bad_imu_;
+  s.imu_gaps = gaps_;
+  s.wheel_scale_steps = aiding_.wheel_speed().scale_steps();
+  s.imu_frozen = imu_noise_.frozen();
+  for (size_t i = 0; i < kAidingSources; ++i)
+    if (used_at_us_[i] != 0 && seconds_between(used_at_us_[i], last_step_us_) <= config_.start.coasting_s)
+      s.aided_by |= 1 << i;
+  s.coasting = coasting_since().has_value();
+  s.coasting_since_us = coasting_since().value_or(0);
+  return s;
+}
+
+}  // namespace roadfix::navigation

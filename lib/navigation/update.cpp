@@ -1,0 +1,112 @@
+#include "navigation/update.h"
+
+#include <cmath>
+#include <limits>
+
+namespace roadfix::navigation {
+
+double Linear::nis(const State& state) const {
+  Eigen::Matrix<double, kMaxColumns, kMaxColumns> P;
+  int row = 0;
+  for (int i = 0; i < blocks_; ++i) {
+    int column = 0;
+    for (int j = 0; j < blocks_; ++j) {
+      P.block(row, column, width(i), width(j)) = state.P().block(at(i), at(j), width(i), width(j));
+      column += width(j);
+    }
+    row += width(i);
+  }
+  Eigen::Matrix<double, kMaxRows, kMaxColumns> HP;
+  HP.topLeftCorner(rows_, columns_).noalias() = H().lazyProduct(P.topLeftCorner(columns_, columns_));
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, kMaxRows> S =
+      HP.topLeftCorner(rows_, columns_).lazyProduct(H().transpose());
+  S.diagonal().array() += 1.0;
+  const Eigen::LLT<decltype(S)> llt(S);
+  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxRows, 1> s = r();
+  llt.matrixL().solveInPlace(s);
+  return s.squaredNorm();
+}
+
+void Linear::expect(const State& state) {
+  int column = 0;
+  for (int k = 0; k < blocks_; ++k) {
+    r_.head(rows_) -= H_.block(0, column, rows_, width(k)) * state.expected().segment(at(k), width(k));
+    column += width(k);
+  }
+}
+
+Columns::Columns(const State& state) {
+  blocks_[count_++] = {kCameraTurn, kCamera};
+  for (const Clone& c : state.clones) blocks_[count_++] = {c.at, 6};
+}
+
+void triangulate_columns(Eigen::Ref<Eigen::MatrixXd> A, int pivots) {
+  const auto rows = static_cast<int>(A.rows()), columns = static_cast<int>(A.cols());
+  for (int k = 0; k < std::min(pivots, rows - 1); ++k) {
+    auto x = A.col(k).tail(rows - k);
+    const double norm = x.norm();
+    if (norm == 0.0) continue;
+    const double end = x(0) > 0.0 ? -norm : norm;
+    x(0) -= end;
+    const double scale = 2.0 / x.squaredNorm();
+    for (int j = k + 1; j < columns; ++j) {
+      auto y = A.col(j).tail(rows - k);
+      y -= (scale * x.dot(y)) * x;
+    }
+    x.setZero();
+    x(0) = end;
+  }
+}
+
+Update::Update()
+    : H_(kMaxRows, kMaxSize), PHt_(kMaxSize, kMaxRows), S_(kMaxRows, kMaxRows), r_(kMaxRows), d_(kMaxSize) {}
+
+void Update::begin(const State& state) {
+  rows_ = 0;
+  size_ = state.size();
+  H_.setZero();
+}
+
+void Update::add(const Linear& rows) {
+  int column = 0;
+  for (int k = 0; k < rows.blocks(); ++k) {
+    H_.block(rows_, rows.at(k), rows.rows(), rows.width(k)) += rows.H().middleCols(column, rows.width(k));
+    column += rows.width(k);
+  }
+  r_.segment(rows_, rows.rows()) = rows.r();
+  rows_ += rows.rows();
+}
+
+void Update::add(const Eigen::Ref<const Eigen::MatrixXd>& stack, const Columns& columns) {
+  const auto count = static_cast<int>(stack.rows());
+  int column = 0;
+  for (const auto& [at, width] : columns.blocks()) {
+    H_.block(rows_, at, count, width) = stack.middleCols(column, width);
+    column += width;
+  }
+  r_.segment(rows_, count) = stack.col(column);
+  rows_ += count;
+}
+
+bool Update::apply(State& state) {
+  if (rows_ == 0) return true;
+  const auto P = state.P().topLeftCorner(size_, size_);
+  const auto H = H_.topLeftCorner(rows_, size_);
+  auto PHt = PHt_.topLeftCorner(size_, rows_);
+  auto S = S_.topLeftCorner(rows_, rows_);
+  PHt.noalias() = P * H.transpose();
+  S.noalias() = H * PHt;
+  S.diagonal().array() += 1.0;
+  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);
+  if (llt.info() != Eigen::Success) return false;
+  llt.matrixU().solveInPlace<Eigen::OnTheRight>(PHt);
+  auto r = r_.head(rows_);
+  llt.matrixL().solveInPlace(r);
+  d_.head(size_).noalias() = PHt * r;
+  state.subtract(PHt);
+  state.correct(d_);
+  return true;
+}
+
+}  // namespace roadfix::navigation

@@ -1,0 +1,130 @@
+// Every aiding Jacobian of the base block against central differences, on 20 seeded states, level and tilted far, and
+// at the identity.
+#include <catch2/catch.hpp>
+
+#include "navigation/aiding/gnss_heading/gnss_heading_model.h"
+#include "navigation/aiding/gnss_position/gnss_position_model.h"
+#include "navigation/aiding/gnss_velocity/gnss_velocity_model.h"
+#include "navigation/aiding/magnetic_heading/magnetic_heading_model.h"
+#include "navigation/aiding/nonholonomic/nonholonomic_model.h"
+#include "navigation/aiding/wheel_speed/wheel_speed_model.h"
+#include "navigation/aiding/wheel_yaw_rate/wheel_yaw_rate_model.h"
+#include "navigation/aiding/zero_motion/zero_motion_model.h"
+#include "random_state.h"
+#include "support/numerical_jacobian.h"
+
+using namespace roadfix;
+using namespace roadfix::navigation;
+
+namespace {
+
+State with_mean(const Mean& mean, const Eigen::Vector3d& p_ref) {
+  State s(false);
+  s.reset(mean, BaseVector::Ones());
+  s.p_ref = p_ref;
+  return s;
+}
+
+// The motion that the same raw samples give in the perturbed state: the rate moves with the gyro bias, the acceleration
+// turns with the attitude only where it is expressed in the level frame, as measured.
+BodyMotion moved(const BodyMotion& m, const BaseVector& d) {
+  BodyMotion out = m;
+  out.rate -= d.segment<3>(kGyroBias);
+  return out;
+}
+
+// `make(state, motion)` gives a measurement whose prediction is minus its residual.
+template <int Rows, class Make>
+double difference(const Make& make, const Mean& x, const BodyMotion& motion, const Eigen::Vector3d& p_ref) {
+  const Measurement<Rows> m = make(with_mean(x, p_ref), motion);
+  const auto h = [&](const BaseVector& d) {
+    return Eigen::Matrix<double, Rows, 1>(m.residual -
+                                          make(with_mean(retract(x, d, p_ref), p_ref), moved(motion, d)).residual);
+  };
+  const Eigen::Matrix<double, Rows, kBaseSize> numeric = test::numerical_jacobian<Rows, kBaseSize>(h, 1e-5);
+  Eigen::Matrix<double, Rows, kBaseSize> analytic = Eigen::Matrix<double, Rows, kBaseSize>::Zero();
+  analytic.template leftCols<kWithoutCamera>() = m.H;
+  INFO("analytic\n" << analytic << "\nnumeric\n" << numeric);
+  CHECK((analytic - numeric).norm() < 1e-6 * std::max(1.0, numeric.norm()));
+  return numeric.norm();
+}
+
+template <int Rows, class Make>
+void check_everywhere(const Make& make) {
+  test::RandomState random(7);
+  BodyMotion motion;
+  (void)difference<Rows>(make, Mean(), motion, Eigen::Vector3d::Zero());
+  for (int i = 0; i < 20; ++i) {
+    const Mean x = random.mean(i % 2 == 0 ? 0.05 : 0.5);
+    motion.rate = random.vector(0.5);
+    motion.acceleration = Eigen::Vector3d::Zero();  // its rotation with phi is left out: a second-order term of `ahead`
+    CHECK(difference<Rows>(make, x, motion, x.nav.position + random.vector(5.0)) > 0.1);
+  }
+}
+
+const Eigen::Matrix3d kCov = Eigen::Matrix3d::Identity();
+
+// s to a measurement stamped 20 ms after the state's epoch.
+double ahead(const Mean& x, double latency) { return 0.02 - latency + x.imu_offset; }
+
+}  // namespace
+
+TEST_CASE("GNSS position Jacobian") {
+  check_everywhere<3>([](const State& s, const BodyMotion& m) {
+    return gnss_position(s, m, Eigen::Vector3d(1.0, 2.0, 3.0), kCov, ahead(s.x, s.x.position_latency));
+  });
+}
+
+TEST_CASE("GNSS velocity Jacobian") {
+  check_everywhere<3>([](const State& s, const BodyMotion& m) {
+    return gnss_velocity(s, m, Eigen::Vector3d(1.0, 2.0, 3.0), kCov, ahead(s.x, s.x.velocity_latency));
+  });
+}
+
+TEST_CASE("GNSS heading Jacobian") {
+  check_everywhere<1>([](const State& s, const BodyMotion&) { return gnss_heading(s, 0.4, 0.01); });
+}
+
+TEST_CASE("magnetic heading Jacobian") {
+  check_everywhere<1>([](const State& s, const BodyMotion&) {
+    return magnetic_heading(s, Eigen::Vector3d(20.0, 5.0, -10.0), 0.05, 0.1);
+  });
+}
+
+TEST_CASE("wheel speed Jacobian") {
+  check_everywhere<1>(
+      [](const State& s, const BodyMotion& m) { return wheel_speed(s, m, 5.0, 0.05, ahead(s.x, s.x.wheel_latency)); });
+}
+
+TEST_CASE("wheel yaw rate Jacobian") {
+  check_everywhere<1>(
+      [](const State& s, const BodyMotion&) { return wheel_yaw_rate(s, Eigen::Vector3d(0.1, -0.2, 0.4), 0.3, 0.01); });
+}
+
+TEST_CASE("non-holonomic constraint Jacobians") {
+  check_everywhere<1>([](const State& s, const BodyMotion& m) { return nonholonomic(s, m, 1, 0.1); });
+  check_everywhere<1>([](const State& s, const BodyMotion& m) { return nonholonomic(s, m, 2, 0.1); });
+}
+
+TEST_CASE("standstill Jacobians") {
+  const Eigen::Vector3d earth(0.0, 5e-5, 5e-5);
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  check_everywhere<3>([](const State& s, const BodyMotion&) { return zero_velocity(s, 0.01); });
+  check_everywhere<3>([&](const State& s, const BodyMotion&) { return zero_rate(s, none, earth, 0.01); });
+  check_everywhere<3>([](const State& s, const BodyMotion&) {
+    return levelling(s, Eigen::Vector3d(0.0, 0.0, 9.8), Eigen::Vector3d(0.0, 0.0, -9.8), 0.1);
+  });
+}
+
+TEST_CASE("velocity rows leave the heading unobserved, and one with phi would not") {
+  test::RandomState random(3);
+  for (int i = 0; i < 20; ++i) {
+    const State s = with_mean(random.mean(0.1), Eigen::Vector3d::Zero());
+    BodyMotion motion;
+    motion.rate = random.vector(0.3);
+    CHECK(wheel_speed(s, motion, 5.0, 0.1, 0.0).H.middleCols<3>(kAtt).isZero(0.0));
+    CHECK(nonholonomic(s, motion, 1, 0.1).H.middleCols<3>(kAtt).isZero(0.0));
+    CHECK(zero_velocity(s, 0.1).H.middleCols<3>(kAtt).isZero(0.0));
+    CHECK(gnss_velocity(s, motion, s.x.nav.velocity, kCov, 0.0).H.middleCols<3>(kAtt).norm() > 1.0);
+  }
+}
