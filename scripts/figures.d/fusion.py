@@ -61,7 +61,7 @@ def dark(runs):
 
 
 def lit_drive(runs, seed):
-    """The figures of all channels on tunnel_lit, the tracker on tracks without pixels (test/bench/fusion_tracks.cpp): stereo, with
+    """The figures of all channels on tunnel_lit, the tracker on tracks without pixels (tools/experiments/fusion_tracks.cpp): stereo, with
     the fusion's restarts. POSE_VO and POSE_WHEEL are tied as in dark_channels()."""
     folder = runs.folder("tunnel_lit", seed)
     log, vehicle, out, report = folder / "drive.lcm", folder / "vehicle", folder / "out.lcm", folder / "report"

@@ -1,6 +1,6 @@
 """The whole stack of configs/demo live on UDP in a network namespace, a client at its dashboard, while the demo drive is played again and again:
   unshare -n python3 live_stack.py ROOT FOLDER SPEED SECONDS_OF_DATA
-Prints JSON: resident memory of each process over the data played, and the latencies of its recording (test/bench/live_latency.cpp)."""
+Prints JSON: resident memory of each process over the data played, and the latencies of its recording (tools/experiments/live_latency.cpp)."""
 import glob
 import json
 import re

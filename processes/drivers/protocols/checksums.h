@@ -1,4 +1,4 @@
-/// The checksums of the devices' protocols, each with its published check value in test/unit/drivers.
+/// The checksums of the devices' protocols, each with its published check value in test/unit/processes/drivers.
 #pragma once
 
 #include <cstdint>

@@ -5,7 +5,7 @@
 #include "bus/log/log_reader.h"
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/evaluate/report.h"
-#include "unit/evaluate_report/small_log.h"
+#include "unit/processes/roadfix/evaluate/small_log.h"
 
 namespace roadfix {
 namespace {

@@ -11,7 +11,7 @@
 #include "simulation/scenarios.h"
 #include "simulation/scene/drive_scene.h"
 #include "simulation/scene/sensor.h"
-#include "unit/scene/streets.h"
+#include "unit/simulation/scene/streets.h"
 
 namespace roadfix {
 namespace {

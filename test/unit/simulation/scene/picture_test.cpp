@@ -7,7 +7,7 @@
 #include "geometry/so3.h"
 #include "simulation/scene/sensor.h"
 #include "stream/thread_pool.h"
-#include "unit/scene/streets.h"
+#include "unit/simulation/scene/streets.h"
 
 namespace roadfix {
 namespace {

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "simulation/scene/tiles.h"
-#include "unit/scene/streets.h"
+#include "unit/simulation/scene/streets.h"
 
 namespace roadfix {
 namespace {

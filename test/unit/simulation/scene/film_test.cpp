@@ -6,7 +6,7 @@
 
 #include "simulation/scenarios.h"
 #include "stream/thread_pool.h"
-#include "unit/scene/streets.h"
+#include "unit/simulation/scene/streets.h"
 
 namespace roadfix {
 namespace {

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "simulation/scene/tracks.h"
-#include "unit/scene/streets.h"
+#include "unit/simulation/scene/streets.h"
 
 namespace roadfix {
 namespace {

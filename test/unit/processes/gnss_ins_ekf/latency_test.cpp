@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 #include <cstdio>
 
-#include "filter_run.h"
 #include "gnss_ins_ekf/handler.h"
 #include "gnss_ins_ekf/messages.h"
+#include "unit/gnss_ins/filter_run.h"
 
 using namespace roadfix;
 

@@ -1,0 +1,1 @@
+// No lib/nowhere is there to test.
