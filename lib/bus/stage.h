@@ -109,6 +109,8 @@ class Stage {
 
   /// YAML, defaults included.
   [[nodiscard]] virtual std::string effective_config() const = 0;
+  /// The same for a person, with the alternatives of each choice as comments.
+  [[nodiscard]] virtual std::string explained_config() const { return effective_config(); }
   /// YAML of the calibration it was made with; empty where it takes none.
   [[nodiscard]] virtual std::string effective_calibration() const { return {}; }
 };

@@ -1,4 +1,4 @@
-/// What is known about one vehicle's sensors: configs/<vehicle>/calibration.yaml, with the keys of a drive folder's
+/// What is known about one vehicle's sensors: configs/VEHICLE/calibration.yaml, with the keys of a drive folder's
 /// drive.yaml. Everything may be absent, and absent means unknown. A wide sigma says that something is to be estimated.
 ///
 /// body: the IMU's axes as given, x forward, y left, z up up to the mounting angles; origin at the IMU.

@@ -65,4 +65,12 @@ std::string config_text(T config) {
   return writer.text();
 }
 
+/// The same for a person: behind each choice stands what else it could be (--print-config).
+template <class T>
+std::string explained_config_text(T config) {
+  YamlWriter writer(YamlWriter::Alternatives::kNamed);
+  visit(config, writer);
+  return writer.text();
+}
+
 }  // namespace roadfix

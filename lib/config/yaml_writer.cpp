@@ -56,8 +56,8 @@ void YamlWriter::line(const char* key, const std::string& value) {
   lines_.push_back(fmt::format("{}: {}", key, value));
 }
 
-void YamlWriter::list_line(const char* key, const std::vector<std::string>& values) {
-  line(key, fmt::format("[{}]", fmt::join(values, ", ")));
+void YamlWriter::list_line(const char* key, const std::vector<std::string>& values, const std::string& comment) {
+  line(key, fmt::format("[{}]{}", fmt::join(values, ", "), comment));
 }
 
 void YamlWriter::block(const char* key, const std::vector<std::string>& lines) {

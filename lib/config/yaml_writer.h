@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <concepts>
 #include <cstdint>
 #include <optional>
@@ -17,6 +18,10 @@ namespace roadfix {
 /// The methods of YamlReader; ranges and conditions are the reader's business. An optional without a value is left out.
 class YamlWriter {
  public:
+  enum class Alternatives { kLeftOut, kNamed };
+  /// kNamed: behind a choice stands, as a comment, what else it could be.
+  explicit YamlWriter(Alternatives alternatives = Alternatives::kLeftOut) : alternatives_(alternatives) {}
+
   void number(const char* key, const double& value, double, double);
   template <std::integral T>
   void integer(const char* key, const T& value, int64_t, int64_t) {
@@ -26,7 +31,7 @@ class YamlWriter {
   void text(const char* key, const std::string& value);
   template <class E>
   void choice(const char* key, const E& value, ChoiceNames<E> names) {
-    line(key, name_of<E>(value, names));
+    line(key, name_of<E>(value, names) + alternatives_text<E>({value}, names));
   }
   template <int R, int C>
   void vector(const char* key, const Eigen::Matrix<double, R, C>& value, double, double) {
@@ -65,7 +70,7 @@ class YamlWriter {
   void choices(const char* key, const std::vector<E>& values, ChoiceNames<E> names) {
     std::vector<std::string> words;
     for (const E& value : values) words.push_back(name_of<E>(value, names));
-    list_line(key, words);
+    list_line(key, words, alternatives_text<E>(values, names));
   }
   template <class T>
   void groups(const char* key, std::vector<T>& values) {
@@ -96,18 +101,29 @@ class YamlWriter {
     }
     return "?";  // a value without a name: the reader refuses it with the list of names
   }
+  template <class E>
+  [[nodiscard]] std::string alternatives_text(const std::vector<E>& chosen, ChoiceNames<E> names) const {
+    if (alternatives_ == Alternatives::kLeftOut) return "";
+    std::string others;
+    for (const auto& [name, meaning] : names) {
+      if (std::find(chosen.begin(), chosen.end(), meaning) != chosen.end()) continue;
+      others += (others.empty() ? "  # or: " : ", ") + std::string(name);
+    }
+    return others;
+  }
   template <class T>
-  static std::vector<std::string> lines_of(T& value) {
-    YamlWriter writer;
+  std::vector<std::string> lines_of(T& value) {
+    YamlWriter writer(alternatives_);
     visit(value, writer);
     return std::move(writer.lines_);
   }
   static std::string matrix_text(const std::vector<double>& flat, int columns);
   void line(const char* key, const std::string& value);
-  void list_line(const char* key, const std::vector<std::string>& values);
+  void list_line(const char* key, const std::vector<std::string>& values, const std::string& comment = "");
   void block(const char* key, const std::vector<std::string>& lines);
   void block_list(const char* key, const std::vector<std::vector<std::string>>& blocks);
 
+  Alternatives alternatives_;
   std::vector<std::string> lines_;
 };
 

@@ -52,7 +52,8 @@ struct DriveFacts {
   ReferenceFacts reference;
   ScoreFacts score;
   std::vector<Outage> outages;       ///< in order of time
-  bool score_withheld_only = false;  ///< fixes were thinned out: score at the withheld ones alone
+  bool score_withheld_only = false;  ///< fixes were thinned out: of a reference that is made of fixes, score the
+                                     ///< withheld ones alone
 };
 
 template <class Visitor>

@@ -12,6 +12,9 @@ constexpr double kDelayPrecision_s = 1e-4;
 constexpr int64_t kPathInterval_us = 100'000;
 constexpr double kWayOfTie = 50.0;  // m
 
+/// Fixes that the estimators were given prove nothing, a reference of another origin does.
+bool withheld_only(const DriveFacts& facts) { return facts.score_withheld_only && facts.reference.from_fixes; }
+
 /// Whether the reference may be scored at a time: both its neighbours may.
 class ScoreMask {
  public:
@@ -32,7 +35,7 @@ class ScoreMask {
  private:
   [[nodiscard]] bool scorable(std::size_t i) const {
     const ReferenceFlags& flags = reference_.flags[i];
-    return flags.may_score && (flags.withheld || !facts_.score_withheld_only);
+    return flags.may_score && (flags.withheld || !withheld_only(facts_));
   }
 
   const Reference& reference_;
@@ -184,6 +187,15 @@ void measure_pairs(ChannelScore& report, const ReferenceKind& kind, const Evalua
   }
 }
 
+/// Of the time with a pose, the share in which it is near enough. Poses and reference may have other rates, so the time
+/// comes from the poses and the share from the pairs.
+std::optional<double> usable_share(const ChannelScore& report, double within) {
+  if (report.errors.empty()) return std::nullopt;
+  const auto near = std::ranges::count_if(report.errors, [&](const PoseError& e) { return e.horizontal() <= within; });
+  return (report.availability.valid + report.availability.coasting) * static_cast<double>(near) /
+         static_cast<double>(report.errors.size());
+}
+
 void measure_outages(ChannelScore& report, const Reference& reference, const DriveFacts& facts,
                      const Trajectory& aligned, const ReferenceKind& kind) {
   report.outages = outage_errors(aligned, reference.trajectory, facts.outages, report.errors, kind);
@@ -232,8 +244,8 @@ std::string lack_of_pairs(const Reference& reference, const DriveFacts& facts, c
   if (pairs.back().reference.t_us < begin_us)
     return "its last valid pose is " + seconds_text(pairs.back().reference.t_us, begin_us) +
            " before the first that is scored";
-  return facts.score_withheld_only ? "no fix that was withheld lies where it is valid"
-                                   : "no part of the reference that may be scored lies where it is valid";
+  return withheld_only(facts) ? "no fix that was withheld lies where it is valid"
+                              : "no part of the reference that may be scored lies where it is valid";
 }
 
 std::string lack_of_alignment(const ChannelScore& report, const ReferenceKind& kind) {
@@ -284,6 +296,7 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
     transform_estimates(*S, report.scored);
   }
   measure_pairs(report, kind, options);
+  report.usable = usable_share(report, options.usable_within);
   if (!report.scored.empty()) {
     const auto honest = honest_pairs(report, unaligned, reference, facts, estimate, kind);
     report.honesty = honesty(honest, kind, facts.reference.sigma_m);

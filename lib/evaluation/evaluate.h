@@ -37,11 +37,15 @@ struct EstimateInput {
   std::vector<ModeSample> modes;                        ///< of the fusion, else empty
 };
 
+/// The error beyond which a pose helps nobody on a road; the monitor's limit for "do not use" (lib/health).
+inline constexpr double kUsableWithin = 5.0;  // m
+
 struct EvaluationOptions {
   std::optional<Alignment> alignment;  ///< none: by the estimate's frame (ENU: none; own: yaw; no scale: sim3)
   std::optional<int64_t> tie_us;       ///< of kTied; none: the last pair before the first outage
   bool fit_delay = false;              ///< the reference's constant latency is fitted first, within +-2 s
   double turn_threshold = 3.0 * 3.14159265358979323846 / 180.0;  ///< rad/s, of MPA
+  double usable_within = kUsableWithin;                          ///< m, horizontally
   int rpe_stride = 100;                                          ///< samples, paper C
 };
 
@@ -85,6 +89,8 @@ struct ChannelScore {
   Honesty honesty;  ///< of an estimate in its own frame: tied to the reference at its start, whatever the alignment;
                     ///< empty where the reference has neither attitude nor way enough for that
   Availability availability;
+  std::optional<double> usable;    ///< share of the time with a pose, valid or coasting, that is `usable_within` of the
+                                   ///< truth; none where nothing is scored
   std::optional<Summary> latency;  ///< s
 
   std::string no_figures;  ///< why nothing is scored; empty where something is

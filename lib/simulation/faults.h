@@ -1,7 +1,7 @@
 /// Things that go wrong, each at a time and for a while, in any scenario. A fault changes what its sensor gives between
 /// start and start + duration (true time) and nothing else: no other sensor, no other sample, no other noise.
 ///
-/// As text: SENSOR.KIND@START[+DURATION][:KEY=VALUE,...], for example gnss.bias@30+5:east_m=15. Without a duration it
+/// As text: `SENSOR.KIND@START[+DURATION]`[:KEY=VALUE,...], for example gnss.bias@30+5:east_m=15. Without a duration it
 /// lasts to the end of the drive. Those of the camera can leave out one eye: camera.dark@10:right=0.
 #pragma once
 

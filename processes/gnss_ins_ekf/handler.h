@@ -10,7 +10,7 @@
 
 namespace roadfix {
 
-/// configs/<vehicle>/gnss_ins_ekf.yaml.
+/// configs/VEHICLE/gnss_ins_ekf.yaml.
 struct GnssInsProcessConfig {
   double publish_period = 0.01;  ///< s, of data time
   double status_period = 0.2;    ///< s, of data time

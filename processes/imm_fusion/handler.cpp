@@ -164,6 +164,7 @@ class ImmFusionStage final : public Stage {
   }
 
   [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+  [[nodiscard]] std::string explained_config() const override { return explained_config_text(config_); }
   [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:

@@ -11,7 +11,7 @@
 
 namespace roadfix {
 
-/// configs/<vehicle>/imm_fusion.yaml.
+/// configs/VEHICLE/imm_fusion.yaml.
 struct ImmFusionConfig {
   double publish_period = 0.01;  ///< s, of data time
   double state_period = 0.1;     ///< s, of data time

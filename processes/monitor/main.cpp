@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   CLI::App& app = arguments.app();
   app.add_option("--log-in", options.logs, "Look at this log instead; several: a drive and what was replayed from it");
   app.add_option("--log-out", options.log_out, "Write HEALTH of the log to this one, and end");
+  arguments.add_overwrite();
   app.add_option("--listen", options.listen,
                  "address:port of the web page; another machine's needs the token it prints");
   app.add_flag("--no-dashboard", options.no_dashboard, "No web page");
@@ -22,6 +23,7 @@ int main(int argc, char** argv) {
     options.bus = arguments.bus;
     options.realtime = arguments.realtime;
     options.print_config = arguments.print_config;
+    options.overwrite = arguments.overwrite;
     roadfix::catch_stop_signals();
     roadfix::run_monitor(options);
     return 0;

@@ -1,4 +1,4 @@
-/// configs/<vehicle>/monitor.yaml: what the vehicle should have, when to complain, and where the dashboard is.
+/// configs/VEHICLE/monitor.yaml: what the vehicle should have, when to complain, and where the dashboard is.
 #pragma once
 
 #include <filesystem>

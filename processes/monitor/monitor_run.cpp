@@ -82,6 +82,7 @@ void run_logs(const MonitorOptions& options, const MonitorConfig& config) {
   for (const std::filesystem::path& log : options.logs) {
     if (!options.log_out.empty()) refuse_to_replace(log, options.log_out);
   }
+  refuse_existing_file(options.log_out, options.overwrite);
   MergedLogs logs(options.logs);
   // A log tells what its car had; which processes should have run, its HEARTBEAT channels tell.
   Expectations expectations = expectations_of(config, options.vehicle);
@@ -119,7 +120,7 @@ void run_monitor(const MonitorOptions& options) {
   }
   if (!options.listen.empty()) config.dashboard.listen = options.listen;
   if (options.print_config) {
-    std::cout << config_text(config);
+    std::cout << explained_config_text(config);
   } else if (options.logs.empty()) {
     run_live(options, config);
   } else {

@@ -15,8 +15,9 @@ struct MonitorOptions {
   std::string bus = kDefaultBusUrl;
   std::vector<std::filesystem::path> logs;  ///< empty: live
   std::filesystem::path log_out;
-  std::string listen;  ///< of the dashboard, instead of monitor.yaml's
-  int realtime = 0;    ///< priority; 0: as everybody
+  bool overwrite = false;  ///< log_out may replace a log
+  std::string listen;      ///< of the dashboard, instead of monitor.yaml's
+  int realtime = 0;        ///< priority; 0: as everybody
   bool no_dashboard = false;
   bool plain = false;
   bool print_config = false;

@@ -31,7 +31,7 @@ int record(const CommandLine& arguments, const std::string& folder) {
   }
   if (!folder.empty()) config.folder = folder;
   if (arguments.print_config) {
-    std::cout << config_text(config);
+    std::cout << explained_config_text(config);
     return 0;
   }
   catch_stop_signals();

@@ -1,4 +1,4 @@
-/// configs/<vehicle>/recorder.yaml: where a drive is recorded to, and what happens when space gets short.
+/// configs/VEHICLE/recorder.yaml: where a drive is recorded to, and what happens when space gets short.
 #pragma once
 
 #include <cstdint>

@@ -21,6 +21,7 @@
 #include "msckf/picture_tracks.h"
 #include "msckf/stamp_line.h"
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
 #include "vo_tracker/camera_rig.h"
 #include "vo_tracker/picture.h"
 
@@ -116,8 +117,7 @@ void add_calibrate_command(CLI::App& app) {
   camera_imu->add_option("log", options->log, "a drive log with IMU and CAMERA_LEFT")
       ->required()
       ->check(CLI::ExistingFile);
-  camera_imu->add_option("--config", options->vehicle, "the vehicle's folder; its calibration.yaml is rewritten")
-      ->required();
+  add_config(*camera_imu, options->vehicle, "The vehicle's configuration folder; its calibration.yaml is rewritten");
   camera_imu->add_flag("--dry-run", options->dry, "print what was found and write nothing");
   camera_imu->callback([options] { calibrate(*options); });
   add_kalibr_command(*command);

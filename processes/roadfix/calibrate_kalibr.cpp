@@ -18,7 +18,9 @@ void add_kalibr_command(CLI::App& calibrate) {
   CLI::App* command = calibrate.add_subcommand(
       "kalibr", "Take lenses, places and time offset of the cameras from Kalibr's camchain-*.yaml");
   command->add_option("chain", options->chain, "what Kalibr wrote")->required()->check(CLI::ExistingFile);
-  command->add_option("--config", options->vehicle, "the vehicle's folder; its calibration.yaml is rewritten")
+  command
+      ->add_option("--config", options->vehicle,
+                   "The vehicle's configuration folder; its calibration.yaml is made or rewritten")
       ->required();
   command->callback([options] {
     const std::filesystem::path path = options->vehicle / "calibration.yaml";

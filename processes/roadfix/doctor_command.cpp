@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
 #include "roadfix/doctor/doctor.h"
 
 namespace roadfix {
@@ -35,7 +36,7 @@ void run(const Options& options) {
   add({check_realtime()});
   add(check_services("/"));
   add(check_devices("/"));
-  if (print_findings(findings, std::cout) == Level::kError) throw CLI::RuntimeError(1);
+  if (print_findings(findings, std::cout) == Level::kError) throw CLI::RuntimeError(kNotGood);
 }
 
 }  // namespace
@@ -47,12 +48,13 @@ void add_doctor_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("doctor",
                                          "Check route, buffers, TTL, loop-back, Java, clock, disk, real time, services "
                                          "and devices; print what mends each");
-  command->add_option("--url", options->url, "the bus")->capture_default_str();
+  command->add_option("--bus,--url", options->url, "LCM URL")->capture_default_str();
   command->add_option("--logs", options->log_folder, "where recordings go")->capture_default_str();
   command->add_option("--space-gib", options->wanted_gib, "space that a drive wants")
       ->check(CLI::Range(0.0, 1e9))
       ->capture_default_str();
   command->add_flag("!--no-loopback", options->loopback, "send nothing, not even to ourselves");
+  command->footer("Exit status: 0 the bus works (warnings too), 1 it does not, 2 wrong usage.");
   command->callback([options] { run(*options); });
 }
 

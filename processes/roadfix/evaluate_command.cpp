@@ -10,6 +10,7 @@
 #include "config/config_error.h"
 #include "geometry/frames.h"
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/evaluate/report.h"
 
@@ -24,7 +25,8 @@ struct Options {
   bool fit_delay = false;
   int64_t tie_us = 0;  ///< 0: not given
   double turn_degps = 3.0;
-  std::filesystem::path out;
+  double usable_m = kUsableWithin;
+  OutputOption out;  ///< a folder
   std::filesystem::path json;
 };
 
@@ -32,6 +34,7 @@ EvaluationOptions evaluation_options(const Options& options) {
   EvaluationOptions out;
   out.fit_delay = options.fit_delay;
   out.turn_threshold = options.turn_degps * kDegree;
+  out.usable_within = options.usable_m;
   if (options.align == "none") out.alignment = Alignment::kNone;
   if (options.align == "yaw") out.alignment = Alignment::kYaw;
   if (options.align == "se3") out.alignment = Alignment::kSe3;
@@ -53,10 +56,7 @@ std::vector<std::string> chosen_channels(const Options& options, const Evaluatio
     }
   }
   if (chosen.empty()) throw EvaluationLogError(options.log.string() + ": no POSE_* channel to evaluate");
-  for (const std::string& channel : chosen) {
-    if (!log.poses.contains(channel))
-      throw EvaluationLogError(options.log.string() + ": no poses on channel " + channel);
-  }
+  for (const std::string& channel : chosen) static_cast<void>(poses_of(log, channel, options.log));
   return chosen;
 }
 
@@ -105,12 +105,14 @@ EvaluationReport evaluate(const Options& options) {
 }
 
 void run(const Options& options) {
-  const EvaluationReport report = evaluate(options);
-  std::filesystem::path folder = options.out;
+  std::filesystem::path folder = options.out.path;
   if (folder.empty()) folder = options.log.parent_path() / (options.log.stem().string() + "-report");
   const std::filesystem::path page = folder / "report.html";
   if (options.json.lexically_normal() == page.lexically_normal())
     throw EvaluationLogError(options.json.string() + ": --json is where the page goes");
+  options.out.refuse_existing_file(page, options.log);
+  if (!options.json.empty()) options.out.refuse_existing_file(options.json, options.log);
+  const EvaluationReport report = evaluate(options);
   const std::string json = report_json(report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   write_text_file(folder / "figures.json", json);
   if (!options.json.empty()) write_text_file(options.json, json);
@@ -130,7 +132,7 @@ void add_evaluate_command(CLI::App& app) {
       ->add_option("--reference", options->reference,
                    "the log with REFERENCE and CONFIG_DRIVE, where it is another one")
       ->check(CLI::ExistingFile);
-  command->add_option("--channel", options->channels, "what to score; every POSE_* channel where none is named");
+  add_channels(*command, options->channels, "what to score; every POSE_* channel where none is named");
   command
       ->add_option(
           "--align", options->align,
@@ -142,7 +144,10 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--turn-degps", options->turn_degps, "yaw rate that counts as a turn (MPA)")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  command->add_option("--out", options->out, "folder for the report; LOG-report where not given");
+  command->add_option("--usable-m", options->usable_m, "largest horizontal error of a pose that counts as usable")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  add_output(*command, options->out, "folder for the report; LOG-report where not given")->required(false);
   command->add_option("--json", options->json, "a copy of the figures");
   command->callback([options] { run(*options); });
 }

@@ -7,6 +7,8 @@
 #include "config/config_error.h"
 #include "evaluation/trajectory_formats.h"
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
+#include "roadfix/console.h"
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/export/mcap_export.h"
 #include "roadfix/export/output_file.h"
@@ -18,7 +20,7 @@ struct Options {
   std::filesystem::path log;
   std::string channel = "POSE_FUSED";
   std::string format = "tum";
-  std::filesystem::path out;
+  OutputOption out;
 };
 
 void write(std::ostream& out, const PoseStream& stream, const Options& options) {
@@ -38,27 +40,24 @@ void write(std::ostream& out, const PoseStream& stream, const Options& options) 
 
 /// The whole log; what is said goes to standard error, where the file may not be.
 void run_mcap(const Options& options) {
-  if (options.out != "-") refuse_to_replace(options.log, options.out);
   LogReader log(options.log);
-  OutputFile out(options.out);
+  OutputFile out(options.out.path);
   const McapSummary summary = write_mcap(log, [&](std::span<const uint8_t> bytes) { out.write(bytes); });
   out.commit();
-  for (const std::string& note : summary.notes) std::cerr << "roadfix export: " << note << "\n";
-  if (!out.is_standard_output()) std::cout << options.out.string() << "\n";
+  for (const std::string& note : summary.notes) say("export", note);
+  if (!out.is_standard_output()) std::cout << options.out.path.string() << "\n";
 }
 
 void run(const Options& options) {
+  options.out.refuse_existing(options.log);
   if (options.format == "mcap") return run_mcap(options);
   const EvaluationLog log = read_evaluation_log(options.log, {options.channel});
-  for (const std::string& note : log.notes) std::cerr << "roadfix export: " << note << "\n";
-  const auto stream = log.poses.find(options.channel);
-  if (stream == log.poses.end()) {
-    throw EvaluationLogError(options.log.string() + ": no poses on channel " + options.channel);
-  }
+  for (const std::string& note : log.notes) say("export", note);
+  const PoseStream& stream = poses_of(log, options.channel, options.log);
   std::ostringstream text;
-  write(text, stream->second, options);
-  write_text_file(options.out, text.str());
-  std::cout << options.out.string() << "\n";
+  write(text, stream, options);
+  write_text_file(options.out.path, text.str());
+  std::cout << options.out.path.string() << "\n";
 }
 
 }  // namespace
@@ -73,7 +72,7 @@ void add_export_command(CLI::App& app) {
   command->add_option("--format", options->format)
       ->check(CLI::IsMember({"tum", "kitti", "csv", "geojson", "mcap"}))
       ->capture_default_str();
-  command->add_option("--out", options->out, "the file to write; MCAP: - for standard output")->required();
+  add_output(*command, options->out, "the file to write; MCAP: - for standard output");
   command->callback([options] { run(*options); });
 }
 

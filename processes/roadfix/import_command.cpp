@@ -1,12 +1,13 @@
 // roadfix import: other people's recordings as a drive log and a vehicle configuration.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
+#include "roadfix/console.h"
 #include "roadfix/import/drive_log.h"
 #include "roadfix/import/source.h"
 #include "roadfix/vehicle_defaults.h"
@@ -16,9 +17,8 @@ namespace {
 
 struct Options {
   std::filesystem::path source;
-  std::filesystem::path out;
+  OutputOption out;
   std::filesystem::path vehicle;
-  bool overwrite = false;
   bool progress = false;
   SourceOptions read;
   ImportChanges changes;
@@ -29,11 +29,6 @@ struct Options {
   std::filesystem::path times;
   std::filesystem::path reference;
 };
-
-void print_progress(std::size_t done, std::size_t all) {
-  std::cerr << fmt::format("\r{} of {} messages ({} %)", done, all, all == 0 ? 100 : 100 * done / all);
-  if (done == all) std::cerr << "\n";
-}
 
 /// What was asked for, from the flags that were given.
 void collect(const CLI::App& command, Options& options) {
@@ -47,6 +42,7 @@ void collect(const CLI::App& command, Options& options) {
 }
 
 void run(Options& options) {
+  options.out.refuse_existing(options.source);
   if (options.read.format.empty()) {
     options.read.format = detect_format(options.source);
     std::cout << options.source.string() << ": format " << options.read.format << "\n";
@@ -59,13 +55,17 @@ void run(Options& options) {
   Drive drive = read_source(options.source, options.read);
   const std::string name = drive.description.name;
   if (!options.vehicle.empty()) {
-    write_vehicle(drive.description.calibration, name, options.vehicle, options.overwrite);
+    write_vehicle(drive.description.calibration, name, options.vehicle, options.out.overwrite);
     for (const std::string& remark : write_process_defaults(options.vehicle)) std::cout << remark << "\n";
   }
-  const bool shows = options.progress || isatty(STDERR_FILENO) == 1;
+  ProgressLine progress("import", options.progress);
   const DriveLogSummary summary =
-      write_drive_log(std::move(drive), options.changes, options.out, shows ? Progress(print_progress) : Progress());
-  std::cout << options.out.string() << ": " << name << "\n" << summary.text;
+      write_drive_log(std::move(drive), options.changes, options.out.path, [&](std::size_t done, std::size_t all) {
+        progress.show(all == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(all),
+                      fmt::format("{} of {} messages", done, all));
+      });
+  progress.end_line();
+  std::cout << options.out.path.string() << ": " << name << "\n" << summary.text;
   if (options.changes.gnss.cut && summary.facts.outages.empty()) {
     std::cout << fmt::format("  GNSS not cut: no window of {} s ends {} s before the last fix\n",
                              options.changes.gnss.cut->length, kWindowMargin);
@@ -109,7 +109,7 @@ void add_import_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("import", "Make a drive log and a vehicle configuration from a recording");
   command->add_option("source", options->source, "a folder, or a file of poses")->required();
-  command->add_option("--out", options->out, "the log to write")->required();
+  add_output(*command, options->out, "the log to write");
   command->add_option("--vehicle", options->vehicle,
                       "folder for calibration.yaml and one file of defaults per process");
   command->add_option("--format", options->read.format, "folder, kitti, euroc or poses (default: what it looks like)")
@@ -124,8 +124,7 @@ void add_import_command(CLI::App& app) {
   command->add_option("--sequence", options->read.sequence, "poses: which one of the folder's sequences");
   command->add_option("--times", options->times, "poses: file of frame times");
   command->add_option("--reference", options->reference, "poses: file of true poses");
-  command->add_flag("--overwrite", options->overwrite, "replace a calibration.yaml that differs");
-  command->add_flag("--progress", options->progress, "show progress even where no terminal is");
+  add_progress(*command, options->progress);
   add_gnss_flags(*command, *options);
   command->callback([command, options] {
     collect(*command, *options);

@@ -2,15 +2,17 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <regex>
 
 #include "bus/log/log_survey.h"
 #include "bus/log/log_writer.h"
-#include "bus/log/output_place.h"
 #include "bus/types/message.h"
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
+#include "roadfix/console.h"
 
 namespace roadfix {
 
@@ -18,17 +20,16 @@ namespace {
 
 struct LogArguments {
   std::string in;
-  std::string out;
+  OutputOption out;
   double from_s = 0.0;
   double to_s = 1e9;
-  std::string channels = ".*";
+  std::vector<std::string> channels;
   bool invert = false;
 };
 
 void print_damage(const LogArguments& arguments, const std::vector<LogDamage>& damage) {
   for (const LogDamage& d : damage) {
-    std::cerr << fmt::format("roadfix: {}: byte {}: {} bytes hold no intact event: {}\n", arguments.in, d.offset,
-                             d.bytes, d.what);
+    say("log", fmt::format("{}: byte {}: {} bytes hold no intact event: {}", arguments.in, d.offset, d.bytes, d.what));
   }
 }
 
@@ -66,16 +67,16 @@ void check_log(const LogArguments& arguments) {
   }
   std::cout << fmt::format("{}: {} events, {}{}\n", arguments.in, survey.events, whole ? "whole" : "not whole",
                            survey.ours() == 0 ? " as a log, but none of them is a message of Roadfix's" : "");
-  if (!whole) throw CLI::RuntimeError(1);
+  if (!whole) throw CLI::RuntimeError(kNotGood);
 }
 
 /// Copies the events that `wanted` takes; their stamps stay.
 template <class Wanted>
 void copy_log(const LogArguments& arguments, const Wanted& wanted) {
-  refuse_to_replace(arguments.in, arguments.out);
+  arguments.out.refuse_existing(arguments.in);
   LogReader reader(arguments.in);
   reader.require_events();
-  LogWriter writer(arguments.out);
+  LogWriter writer(arguments.out.path);
   int64_t events = 0;
   while (const std::optional<LogEvent> event = reader.next()) {
     ++events;
@@ -83,11 +84,11 @@ void copy_log(const LogArguments& arguments, const Wanted& wanted) {
   }
   const int64_t written = writer.events();
   if (written == 0)
-    throw std::runtime_error(arguments.out + ": not written: none of the " + std::to_string(events) +
+    throw std::runtime_error(arguments.out.path.string() + ": not written: none of the " + std::to_string(events) +
                              " events is wanted");
   writer.commit();
   print_damage(arguments, reader.damage());
-  std::cout << fmt::format("{}: {} of {} events\n", arguments.out, written, events);
+  std::cout << fmt::format("{}: {} of {} events\n", arguments.out.path.string(), written, events);
 }
 
 /// By the messages' own time, where they have one; in seconds after the earliest.
@@ -114,14 +115,19 @@ void cut_log(const LogArguments& arguments) {
 }
 
 void filter_log(const LogArguments& arguments) {
-  std::regex channels;
-  try {
-    channels = std::regex(arguments.channels);
-  } catch (const std::regex_error& e) {
-    throw std::runtime_error("--channels '" + arguments.channels + "': " + e.what());
+  std::vector<std::regex> channels;
+  for (const std::string& pattern : arguments.channels) {
+    try {
+      channels.emplace_back(pattern);
+    } catch (const std::regex_error& e) {
+      throw std::runtime_error("--channel '" + pattern + "': " + e.what());
+    }
   }
   copy_log(arguments, [&](const LogEvent& event) {
-    return std::regex_match(event.channel.begin(), event.channel.end(), channels) != arguments.invert;
+    const bool matches = std::any_of(channels.begin(), channels.end(), [&](const std::regex& channel) {
+      return std::regex_match(event.channel.begin(), event.channel.end(), channel);
+    });
+    return matches != arguments.invert;
   });
 }
 
@@ -133,13 +139,14 @@ void add_log_command(CLI::App& app) {
   log->require_subcommand(1);
   const auto add = [&](const std::string& name, const std::string& what, bool writes) {
     CLI::App* command = log->add_subcommand(name, what);
-    command->add_option("IN", arguments->in, "Log")->required();
-    if (writes) command->add_option("--out", arguments->out, "Log to write")->required();
+    command->add_option("log", arguments->in, "Log")->required()->check(CLI::ExistingFile);
+    if (writes) add_output(*command, arguments->out, "Log to write");
     return command;
   };
   add("info", "Channels, types, rates", false)->callback([arguments] { print_info(*arguments); });
-  add("check", "Damage, broken messages, gaps, stamps that contradict seq; exit status 1 where there is any", false)
-      ->callback([arguments] { check_log(*arguments); });
+  CLI::App* check = add("check", "Damage, broken messages, gaps, stamps that contradict seq", false);
+  check->footer("Exit status: 0 the log is whole, 1 it is not, 2 not done: standard error says why.");
+  check->callback([arguments] { check_log(*arguments); });
   add("repair", "Copy all intact events", true)->callback([arguments] {
     copy_log(*arguments, [](const LogEvent&) { return true; });
   });
@@ -148,7 +155,11 @@ void add_log_command(CLI::App& app) {
   cut->add_option("--to-s", arguments->to_s, "Seconds after the first message, exclusive");
   cut->callback([arguments] { cut_log(*arguments); });
   CLI::App* filter = add("filter", "Copy some channels", true);
-  filter->add_option("--channels", arguments->channels, "Regular expression over the whole name")->required();
+  filter
+      ->add_option("--channel,--channels", arguments->channels,
+                   "Regular expression over the whole name; again for more")
+      ->required()
+      ->allow_extra_args(false);
   filter->add_flag("--invert", arguments->invert, "All but these");
   filter->callback([arguments] { filter_log(*arguments); });
 }

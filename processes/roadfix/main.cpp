@@ -2,16 +2,34 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 
+#include "bus/run/build_id.h"
+#include "bus/run/command_line.h"
 #include "geometry/determinism.h"
 #include "roadfix/commands.h"
 
 namespace {
 
-/// Wrong usage, a bad file or a bad value: the message names it, the shell sees 2 (STYLE.md, section 5).
+/// Wrong usage, a bad file or a bad value: the message names it, the shell sees 2 (docs/STYLE.md, section 5).
 constexpr int kUserError = 2;
+
+/// "roadfix", and the subcommands that were given.
+std::string called_as(const CLI::App& app) {
+  const std::vector<const CLI::App*> given =
+      app.get_subcommands([](const CLI::App* command) { return command->parsed(); });
+  return app.get_name() + (given.empty() ? "" : " " + called_as(*given.front()));
+}
+
+/// Said at the end of each subcommand's help.
+void set_footers(CLI::App& app) {
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
+    if (command->get_footer().empty()) command->footer("Exit status: 0 done, 2 not done: standard error says why.");
+    set_footers(*command);
+  }
+}
 
 /// No option means NaN, and comparisons let it through every range.
 void refuse_nan(CLI::App& app) {
@@ -40,9 +58,11 @@ void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
 
 int main(int argc, char** argv) {
   roadfix::fix_eigen_blocking();
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is then an error like a full disk
+  std::signal(SIGXFSZ, SIG_IGN);                  // a limit on the size of files is then an error like a full disk
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // whole lines also where both outputs go to one file
   CLI::App app{"Roadfix: localization for road vehicles, replayable to the bit", "roadfix"};
   app.require_subcommand(1);
+  app.set_version_flag("--version", roadfix::version_text("roadfix"), "Print version and build, and end");
   roadfix::add_calibrate_command(app);
   roadfix::add_doctor_command(app);
   roadfix::add_evaluate_command(app);
@@ -54,15 +74,15 @@ int main(int argc, char** argv) {
   roadfix::add_simulate_command(app);
   roadfix::add_verify_command(app);
   refuse_nan(app);
+  set_footers(app);
   try {
     refuse_unknown_command(app, argc, argv);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    // CLI11's own codes are above 100; a subcommand that has said what failed ends with its small one.
-    const int code = app.exit(e);
-    return code > 100 ? kUserError : code;
+    return roadfix::end_of_parsing(app, e, called_as(app));
   } catch (const std::exception& e) {
-    std::cerr << "roadfix: " << e.what() << "\n";
+    std::cout << std::flush;
+    std::cerr << called_as(app) << ": " << e.what() << "\n";
     return kUserError;
   }
   return 0;

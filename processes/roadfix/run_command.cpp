@@ -31,7 +31,7 @@ void run(const Options& options) {
     if (!process.plain && process.realtime_priority == 0) process.realtime_priority = options.realtime;
   }
   if (options.print_config) {
-    std::cout << config_text(config);
+    std::cout << explained_config_text(config);
     return;
   }
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stop_asked = 1; });
@@ -56,7 +56,7 @@ void add_run_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("run", "Start a vehicle's processes, restart what dies, stop all in order on Ctrl-C");
-  command->add_option("vehicle", options->vehicle, "folder with run.yaml, for example configs/demo")
+  command->add_option("vehicle,--config", options->vehicle, "folder with run.yaml, for example configs/demo")
       ->required()
       ->check(CLI::ExistingDirectory);
   command->add_option("--bus", options->bus, "LCM URL instead of run.yaml's");

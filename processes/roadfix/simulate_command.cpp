@@ -12,6 +12,8 @@
 #include <thread>
 
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
+#include "roadfix/console.h"
 #include "roadfix/import/drive_log.h"
 #include "roadfix/simulate/scenario_file.h"
 #include "roadfix/simulate/simulated_log.h"
@@ -24,7 +26,7 @@ namespace {
 struct Options {
   std::string scenario;
   std::uint64_t seed = 1;
-  std::filesystem::path out;
+  OutputOption out;
   std::filesystem::path vehicle;
   double duration_s = 0.0;
   bool mono = false;
@@ -37,7 +39,7 @@ struct Options {
   std::vector<std::string> faults;
   bool list = false;
   bool print_config = false;
-  bool overwrite = false;
+  bool progress = false;
   bool timing = false;
 };
 
@@ -65,23 +67,21 @@ void set_camera(const Options& options, CameraConfig& camera) {
   int height = 0;
   char end = 0;
   if (std::sscanf(options.picture_size.c_str(), "%4dx%4d%c", &width, &height, &end) != 2 || width < 64 || height < 48)
-    throw std::runtime_error("simulate: --picture-size is WIDTHxHEIGHT, at least 64x48, not " + options.picture_size);
+    throw std::runtime_error("--picture-size is WIDTHxHEIGHT, at least 64x48, not " + options.picture_size);
   camera = with_size(camera, width, height);
 }
 
-/// A line on standard error for each tenth of the exposures.
-std::function<void(std::size_t)> progress_lines(std::size_t exposures) {
+std::function<void(std::size_t)> shown_on(ProgressLine& line, std::size_t exposures) {
   const auto begin = std::chrono::steady_clock::now();
-  return [exposures, begin](std::size_t done) {
-    if (exposures < 10 || done * 10 / exposures == (done - 1) * 10 / exposures) return;
+  return [&line, exposures, begin](std::size_t done) {
     const double taken_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::cerr << fmt::format("simulate: {} of {} exposures, {:.1f} a second\n", done, exposures,
-                             static_cast<double>(done) / taken_s);
+    line.show(static_cast<double>(done) / static_cast<double>(exposures),
+              fmt::format("{} of {} exposures, {:.1f} a second", done, exposures, static_cast<double>(done) / taken_s));
   };
 }
 
 ScenarioConfig configured(const Options& options) {
-  if (options.scenario.empty()) throw std::runtime_error("simulate: which scenario? (--list shows all)");
+  if (options.scenario.empty()) throw std::runtime_error("which scenario? (--list shows all)");
   ScenarioConfig config = load_scenario(options.scenario);
   if (options.duration_s > 0.0) config.duration_s = options.duration_s;
   set_camera(options, config.camera);
@@ -90,8 +90,9 @@ ScenarioConfig configured(const Options& options) {
     const Fault& fault = config.faults.back();
     const bool blind = fault.sensor == Sensor::kCamera && config.camera.layout == CameraLayout::kNone;
     if (fault.start_s < config.duration_s && !blind) continue;
-    std::cerr << fmt::format("simulate: fault {} never acts: {}\n", text,
-                             blind ? "there is no camera" : fmt::format("the drive ends at {} s", config.duration_s));
+    say("simulate",
+        fmt::format("fault {} never acts: {}", text,
+                    blind ? "there is no camera" : fmt::format("the drive ends at {} s", config.duration_s)));
   }
   return config;
 }
@@ -103,18 +104,21 @@ void run(const Options& options) {
     std::cout << scenario_text(config);
     return;
   }
-  if (options.out.empty()) throw std::runtime_error("simulate: --out DRIVE.lcm is missing");
+  if (options.out.path.empty()) throw std::runtime_error("--out DRIVE.lcm is missing");
+  options.out.refuse_existing(std::filesystem::path(options.scenario));
   const auto begin = std::chrono::steady_clock::now();
   const SimulatedDrive drive = simulate(config, options.seed);
   if (!options.vehicle.empty()) {
-    write_vehicle(calibration_of(drive), config.name, options.vehicle, options.overwrite);
+    write_vehicle(calibration_of(drive), config.name, options.vehicle, options.out.overwrite);
   }
   ThreadPool threads(options.threads > 0 ? options.threads
                                          : std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  ProgressLine progress("simulate", options.progress);
   const std::string summary =
-      write_simulated_log(drive, options.out, {threads, progress_lines(drive.exposures.size())});
+      write_simulated_log(drive, options.out.path, {threads, shown_on(progress, drive.exposures.size())});
+  progress.end_line();
   const double taken_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  std::cout << options.out.string() << ": " << config.name << ", seed " << options.seed << "\n" << summary;
+  std::cout << options.out.path.string() << ": " << config.name << ", seed " << options.seed << "\n" << summary;
   if (!options.vehicle.empty()) std::cout << "vehicle: " << options.vehicle.string() << "\n";
   if (options.timing) {
     const double cpu_s = static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
@@ -134,7 +138,7 @@ void add_simulate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("simulate", "Make a drive log whose truth is known exactly");
   command->add_option("scenario", options->scenario, "name of a scenario, or a YAML file");
   command->add_option("--seed", options->seed, "of every random number")->capture_default_str();
-  command->add_option("--out", options->out, "the log to write");
+  add_output(*command, options->out, "the log to write")->required(false);
   command->add_option("--vehicle", options->vehicle, "folder for calibration.yaml");
   command->add_option("--duration", options->duration_s, "s, in place of the scenario's own")
       ->check(CLI::Range(1.0, 86400.0));
@@ -150,7 +154,7 @@ void add_simulate_command(CLI::App& app) {
       ->allow_extra_args(false);
   command->add_flag("--list", options->list, "show scenarios and faults");
   command->add_flag("--print-config", options->print_config, "show the scenario's values as YAML");
-  command->add_flag("--overwrite", options->overwrite, "replace a calibration.yaml that differs");
+  add_progress(*command, options->progress);
   command->add_flag("--timing", options->timing, "say how long it took");
   command->callback([options] { run(*options); });
 }

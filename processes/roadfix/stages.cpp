@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "config/calibration.h"
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"
 #include "vo_tracker/handler.h"
@@ -36,6 +37,15 @@ std::vector<std::string> stage_names() {
   std::vector<std::string> names;
   for (const KnownStage& stage : known_stages()) names.push_back(stage.name);
   return names;
+}
+
+bool is_for_vehicle(const std::string& stage, const std::filesystem::path& vehicle_dir) {
+  if (stage != "vo_tracker" || !std::filesystem::exists(vehicle_dir / "calibration.yaml")) return true;
+  try {
+    return load_calibration(vehicle_dir).sensors.camera_left.has_value();
+  } catch (const std::runtime_error&) {
+    return true;
+  }
 }
 
 std::vector<std::unique_ptr<Stage>> make_stages(const std::vector<std::string>& names,

@@ -25,9 +25,9 @@ std::vector<std::string> write_process_defaults(const std::filesystem::path& dir
   std::vector<std::string> remarks;
   for (const std::string& stage : stage_names()) {
     const std::filesystem::path path = directory / (stage + ".yaml");
-    if (std::filesystem::exists(path)) continue;
+    if (std::filesystem::exists(path) || !is_for_vehicle(stage, directory)) continue;
     try {
-      write_text_file(path, commented(stage, make_stages({stage}, directory).front()->effective_config()));
+      write_text_file(path, commented(stage, make_stages({stage}, directory).front()->explained_config()));
     } catch (const std::runtime_error& e) {
       remarks.push_back(fmt::format("{}: not with this calibration: {}", stage, e.what()));
     }

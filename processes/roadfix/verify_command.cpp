@@ -7,6 +7,7 @@
 
 #include "bus/verify/verify.h"
 #include "roadfix/commands.h"
+#include "roadfix/common_options.h"
 #include "roadfix/stages.h"
 
 namespace roadfix {
@@ -15,7 +16,7 @@ namespace {
 
 struct VerifyArguments {
   std::vector<std::string> logs;
-  std::string config;
+  std::filesystem::path config;
   std::vector<std::string> stages;
 };
 
@@ -47,6 +48,7 @@ void print_stage(const StageVerdict& stage) {
 void run_verify(const VerifyArguments& arguments) {
   std::vector<NewStage> stages;
   for (const std::string& name : arguments.stages.empty() ? stage_names() : arguments.stages) {
+    if (arguments.stages.empty() && !is_for_vehicle(name, arguments.config)) continue;
     try {
       static_cast<void>(make_stages({name}, arguments.config));  // what is wrong with the configuration shows here
     } catch (const std::runtime_error& e) {
@@ -56,7 +58,8 @@ void run_verify(const VerifyArguments& arguments) {
     }
     stages.emplace_back([name, &arguments] { return std::move(make_stages({name}, arguments.config).front()); });
   }
-  if (stages.empty()) throw std::runtime_error(arguments.config + ": no stage can be made with this configuration");
+  if (stages.empty())
+    throw std::runtime_error(arguments.config.string() + ": no stage can be made with this configuration");
   const VerifyReport report = verify({arguments.logs.begin(), arguments.logs.end()}, stages);
   print_list("damaged", report.log_damage);
   int64_t identical = 0;
@@ -70,7 +73,7 @@ void run_verify(const VerifyArguments& arguments) {
   }
   std::cout << fmt::format("verify: {} identical, {} differing, {} unverifiable\n", identical, differing, unverifiable);
   if (report.stages.empty()) throw std::runtime_error("the log holds no output of any of these stages");
-  if (differing > 0 || identical == 0) throw CLI::RuntimeError(1);
+  if (differing > 0 || identical == 0) throw CLI::RuntimeError(kNotGood);
 }
 
 }  // namespace
@@ -80,12 +83,12 @@ void add_verify_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("verify", "Compute a recorded drive again and compare every output, byte for byte");
   command
-      ->add_option("DRIVE", arguments->logs,
+      ->add_option("log", arguments->logs,
                    "The recording: one log, or all files that it was split into, of several hosts' recorders too")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("--config", arguments->config, "The vehicle's configuration folder")->required();
-  command->add_option("--stages", arguments->stages, "Only these, separated by commas")->delimiter(',');
+  add_config(*command, arguments->config);
+  add_stages(*command, arguments->stages, "Only these, separated by commas");
   command->footer("Exit status: 0 nothing differs, 1 something differs or nothing could be compared, 2 wrong usage.");
   command->callback([arguments] { run_verify(*arguments); });
 }

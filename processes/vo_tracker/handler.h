@@ -33,7 +33,7 @@ void visit(MsckfVoConfig& c, Visitor& v) {
   v.group("tuning", c.tuning);
 }
 
-/// configs/<vehicle>/vo_tracker.yaml.
+/// configs/VEHICLE/vo_tracker.yaml.
 struct VoTrackerConfig {
   VoMode mode = VoMode::kAuto;
   int threads = 2;               ///< 2: bundle adjustment runs beside the tracking; the results are the same

@@ -135,6 +135,7 @@ void KeyframeStage::load(std::span<const uint8_t> state) {
 }
 
 std::string KeyframeStage::effective_config() const { return config_text(config_); }
+std::string KeyframeStage::explained_config() const { return explained_config_text(config_); }
 std::string KeyframeStage::effective_calibration() const { return calibration_text(calibration_); }
 
 }  // namespace roadfix

@@ -32,6 +32,7 @@ class KeyframeStage final : public Stage {
   /// Each map's beginning: what led to it need not be computed again.
   [[nodiscard]] bool wants_snapshot() const override { return map_began_; }
   [[nodiscard]] std::string effective_config() const override;
+  [[nodiscard]] std::string explained_config() const override;
   [[nodiscard]] std::string effective_calibration() const override;
 
  private:

@@ -251,6 +251,7 @@ void MsckfStage::load(std::span<const uint8_t> state) {
 }
 
 std::string MsckfStage::effective_config() const { return config_text(config_); }
+std::string MsckfStage::explained_config() const { return explained_config_text(config_); }
 std::string MsckfStage::effective_calibration() const { return calibration_text(calibration_); }
 
 }  // namespace roadfix

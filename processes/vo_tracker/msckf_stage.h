@@ -27,6 +27,7 @@ class MsckfStage final : public Stage {
   [[nodiscard]] std::vector<uint8_t> save() const override;
   void load(std::span<const uint8_t> state) override;
   [[nodiscard]] std::string effective_config() const override;
+  [[nodiscard]] std::string explained_config() const override;
   [[nodiscard]] std::string effective_calibration() const override;
 
  private:

@@ -127,6 +127,7 @@ class WheelOdometryStage final : public Stage {
   }
 
   [[nodiscard]] std::string effective_config() const override { return config_text(config_); }
+  [[nodiscard]] std::string explained_config() const override { return explained_config_text(config_); }
   [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:

@@ -10,7 +10,7 @@
 
 namespace roadfix {
 
-/// configs/<vehicle>/wheel_odometry.yaml.
+/// configs/VEHICLE/wheel_odometry.yaml.
 struct WheelOdometryConfig {
   double publish_period = 0.02;  ///< s, of data time
   WheelTuning odometry;

@@ -67,7 +67,10 @@ class Runs:
         raise Skipped(f"{program} printed no median of {counter}")
 
     def roadfix(self, *arguments):
-        return self.call(self.program("roadfix"), *arguments)
+        """A subcommand of the tool; what an earlier measurement wrote is replaced."""
+        writes = arguments[0] in ("evaluate", "export", "import", "replay", "simulate") and "--out" in arguments
+        replace = ("--overwrite",) if writes and "--overwrite" not in arguments else ()
+        return self.call(self.program("roadfix"), *arguments, *replace)
 
     def imported(self, drive, *flags):
         """(log, vehicle folder) of a drive of ../shared/data imported with these flags."""

@@ -50,7 +50,7 @@ if [[ $trouble == killed ]]; then
     head -c $((size - cut)) "$log" >"$folder/cut.lcm"
     if "$bin/roadfix" log check "$folder/cut.lcm" >/dev/null 2>"$folder/said"; then fail "$cut bytes short passes the check"; fi
     grep -q 'hold no intact event' "$folder/said" || fail "$cut bytes short: the damage is not said"
-    "$bin/roadfix" log repair "$folder/cut.lcm" --out "$folder/mended.lcm" >/dev/null 2>&1 || true
+    "$bin/roadfix" log repair "$folder/cut.lcm" --out "$folder/mended.lcm" --overwrite >/dev/null 2>&1 || true
     "$bin/roadfix" log check "$folder/mended.lcm" >/dev/null || fail 'what was repaired does not pass the check'
     [[ $(events "$folder/mended.lcm") -ge $(($(events "$log") - 4)) ]] || fail 'repair lost whole events'
   done

@@ -59,7 +59,7 @@ class Evaluate(unittest.TestCase):
     def test_another_log_may_hold_the_reference(self):
         outs = []
         for flags in ((), ("--reference", ROOT / "logs/demo.lcm")):
-            done = roadfix("evaluate", self.log, "--out", self.folder / "either", *flags)
+            done = roadfix("evaluate", self.log, "--out", self.folder / "either", "--overwrite", *flags)
             self.assertEqual(done.returncode, 0, done.stderr)
             outs.append((self.folder / "either" / "figures.json").read_text())
         self.assertEqual(*outs)

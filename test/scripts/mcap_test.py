@@ -17,7 +17,7 @@ LOG = ROOT / "logs" / "demo.lcm"
 
 
 def export(log, out, **options):
-    command = [PROGRAM, "export", log, "--format", "mcap", "--out", out]
+    command = [PROGRAM, "export", log, "--format", "mcap", "--overwrite", "--out", out]
     return subprocess.run(list(map(str, command)), capture_output=True, check=False, **options)
 
 
@@ -42,7 +42,7 @@ class Writing(unittest.TestCase):
         done = export(LOG, "/dev/full")
         self.assertEqual(done.returncode, 2)
         self.assertIn(b"/dev/full: cannot be written: No space left on device", done.stderr)
-        limited = ["bash", "-c", f"ulimit -f 1000; exec {PROGRAM} export {LOG} --format mcap --out {self.folder}/a.mcap"]
+        limited = ["bash", "-c", f"ulimit -f 1000; exec {PROGRAM} export {LOG} --format mcap --overwrite --out {self.folder}/a.mcap"]
         done = subprocess.run(limited, capture_output=True, check=False)
         self.assertEqual(done.returncode, 2)
         self.assertIn(b"a.mcap.part: cannot be written", done.stderr)

@@ -35,4 +35,12 @@ inline void refuse_to_replace(const std::filesystem::path& in, const std::filesy
   }
 }
 
+/// Throws std::runtime_error where `out` is a file that is there already, is not empty, and `overwrite` is not set.
+inline void refuse_existing_file(const std::filesystem::path& out, bool overwrite) {
+  std::error_code ignored;
+  if (overwrite || !std::filesystem::is_regular_file(out, ignored)) return;
+  if (std::filesystem::file_size(out, ignored) == 0) return;
+  throw std::runtime_error(out.string() + ": is there already; --overwrite replaces it");
+}
+
 }  // namespace roadfix

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <iostream>
 
+#include "bus/log/output_place.h"
+#include "bus/run/build_id.h"
 #include "bus/transport/network_bus.h"
 
 namespace roadfix {
@@ -33,20 +35,36 @@ void CommandLine::add_logs(const std::string& help_in, const std::string& help_o
   CLI::Option* out = app_->add_option("--log-out", log_out, help_out);
   in->needs(out);
   out->needs(in);
+  add_overwrite();
 }
+
+void CommandLine::add_overwrite() { app_->add_flag("--overwrite", overwrite, "Replace a log that is there already"); }
 
 int CommandLine::run(int argc, char** argv, const std::function<int()>& work) {
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "roadfix";
   app_->name(name);
+  app_->set_version_flag("--version", version_text(name), "Print version and build, and end");
   try {
     app_->parse(argc, argv);
+    if (!log_in.empty() && !log_out.empty()) {
+      refuse_to_replace(log_in, log_out);
+      refuse_existing_file(log_out, overwrite);
+    }
     return work();
   } catch (const CLI::ParseError& e) {
-    return app_->exit(e) == 0 ? 0 : kUserError;
+    return end_of_parsing(*app_, e, name);
   } catch (const std::exception& e) {
     std::cerr << name << ": " << e.what() << "\n";
     return kUserError;
   }
+}
+
+int end_of_parsing(const CLI::App& app, const CLI::ParseError& error, const std::string& name) {
+  if (dynamic_cast<const CLI::RuntimeError*>(&error) != nullptr) return error.get_exit_code();
+  if (error.get_exit_code() == 0) return app.exit(error);
+  std::cout << std::flush;
+  std::cerr << name << ": " << error.what() << " (" << name << " --help tells more)\n";
+  return kUserError;
 }
 
 }  // namespace roadfix

@@ -8,7 +8,8 @@
 
 namespace CLI {  // NOLINT(readability-identifier-naming): not ours
 class App;
-}
+class ParseError;
+}  // namespace CLI
 
 namespace roadfix {
 
@@ -24,8 +25,9 @@ class CommandLine {
   /// For what only this process takes.
   void option(const std::string& name, std::string& value, const std::string& help);
   CLI::App& app() { return *app_; }
-  /// --log-in and --log-out, which go together.
+  /// --log-in and --log-out, which go together, and --overwrite.
   void add_logs(const std::string& help_in, const std::string& help_out);
+  void add_overwrite();
 
   /// Reads the arguments and works. What `work` throws is told to the user.
   int run(int argc, char** argv, const std::function<int()>& work);
@@ -33,11 +35,16 @@ class CommandLine {
   std::string config;  ///< the vehicle's folder
   std::string bus;
   std::string log_in, log_out;
-  int realtime = 0;  ///< priority; 0: as everybody
+  bool overwrite = false;  ///< --log-out may replace a log
+  int realtime = 0;        ///< priority; 0: as everybody
   bool print_config = false;
 
  private:
   std::unique_ptr<CLI::App> app_;
 };
+
+/// The exit status after an application's parse() has thrown: prints the help or the version that was asked for, or
+/// says under `name` what is wrong with the arguments. A RuntimeError is a status alone: what it means was said.
+int end_of_parsing(const CLI::App& app, const CLI::ParseError& error, const std::string& name);
 
 }  // namespace roadfix

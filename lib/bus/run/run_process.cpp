@@ -52,7 +52,7 @@ void run_live(const CommandLine& arguments, const std::string& memory, const Mak
 void run(const CommandLine& arguments, const std::string& memory, const MakeStage& make) {
   std::unique_ptr<Stage> stage = make(arguments.config);
   if (arguments.print_config) {
-    std::cout << stage->effective_config();
+    std::cout << stage->explained_config();
   } else if (arguments.log_in.empty()) {
     run_live(arguments, memory, make, stage->spec().name);
   } else {

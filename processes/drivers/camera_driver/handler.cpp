@@ -105,7 +105,7 @@ DriverSetup camera_driver_setup(const CameraDriverConfig& config) {
   setup.name = "camera_driver";
   for (std::size_t i = 0; i < config.devices.size(); ++i) setup.raw_channels.push_back("RAW_" + config.channels[i]);
   setup.publish_raw = config.publish_raw;
-  setup.config = config_text(config);
+  setup.config = explained_config_text(config);
   setup.device.device = config.devices.front();
   setup.device.silence = config.silence;
   setup.device.reopen_first = config.reopen_first;

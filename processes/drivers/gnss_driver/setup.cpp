@@ -7,7 +7,7 @@ DriverSetup gnss_driver_setup(const GnssDriverConfig& config) {
   DriverSetup setup;
   setup.name = "gnss_driver";
   setup.raw_channels = {"RAW_GNSS"};
-  setup.config = config_text(config);
+  setup.config = explained_config_text(config);
   setup.device = config.device;
   setup.make = [config] { return std::make_unique<GnssDriver>(config); };
   setup.open = [config](const auto&) { return open_byte_source(config.device); };

@@ -264,7 +264,7 @@ DriverSetup imu_driver_setup(const ImuDriverConfig& config) {
   DriverSetup setup;
   setup.name = "imu_driver";
   setup.raw_channels = {"RAW_IMU"};
-  setup.config = config_text(config);
+  setup.config = explained_config_text(config);
   setup.device = config.device;
   setup.make = [config] { return std::make_unique<ImuDriver>(config); };
   setup.open = [config](const auto&) { return open_byte_source(config.device); };

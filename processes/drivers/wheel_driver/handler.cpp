@@ -121,7 +121,7 @@ DriverSetup wheel_driver_setup(const WheelDriverConfig& config) {
   DriverSetup setup;
   setup.name = "wheel_driver";
   setup.raw_channels = {"RAW_WHEELS"};
-  setup.config = config_text(config);
+  setup.config = explained_config_text(config);
   setup.device = config.device;
   setup.make = [config] { return std::make_unique<WheelDriver>(config); };
   setup.open = [config](const auto&) { return open_byte_source(config.device); };

@@ -134,6 +134,7 @@ class LogCollector {
     const std::string channel(event.channel);
     const bool config = channel == "CONFIG_DRIVE";
     const bool fusion = channel == "FUSION_STATE";
+    if (channel == kReferenceChannel || channel.starts_with("POSE_")) log_.pose_channels.insert(channel);
     if (!is_pose(channel) && !config && !fusion) return true;
     const MessageCheck& check = config ? checks_.config : fusion ? checks_.fusion : checks_.pose;
     if (check(event.data) != CheckResult::kOk) return false;
@@ -235,6 +236,15 @@ EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::
         fmt::format("{} is damaged in {} places; what is intact was used", path.string(), reader.damage().size()));
   }
   return log;
+}
+
+const PoseStream& poses_of(const EvaluationLog& log, const std::string& channel, const std::filesystem::path& path) {
+  const auto found = log.poses.find(channel);
+  if (found != log.poses.end()) return found->second;
+  throw EvaluationLogError(fmt::format("{}: no poses on channel {} ({})", path.string(), channel,
+                                       log.pose_channels.empty()
+                                           ? "there are none at all"
+                                           : fmt::format("there are {}", fmt::join(log.pose_channels, ", "))));
 }
 
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {

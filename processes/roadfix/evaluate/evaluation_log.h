@@ -39,6 +39,7 @@ struct EvaluationLog {
   bool has_facts = false;
   Calibration calibration;
   std::map<std::string, PoseStream> poses;  ///< REFERENCE among them
+  std::set<std::string> pose_channels;      ///< POSE_* and REFERENCE that the log holds, read or not
   FusionSeries fusion;
   std::vector<std::string> notes;  ///< what a reader of the figures must know: damage, missing facts
 };
@@ -46,6 +47,9 @@ struct EvaluationLog {
 /// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE and FUSION_STATE, each in
 /// the order of its messages' own time. Throws LogError where the file is no log of ours.
 EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels);
+
+/// The poses of `channel`. Throws where there are none, naming the channels that have some.
+const PoseStream& poses_of(const EvaluationLog& log, const std::string& channel, const std::filesystem::path& path);
 
 /// The stream in another ENU frame; a local stream stays as it is.
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor);

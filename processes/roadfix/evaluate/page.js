@@ -259,6 +259,7 @@ function card(c) {
     if (f.honesty.position_m.samples) add("within 3 sigma", `${(100 * f.honesty.position_m.within_3sigma).toFixed(1)} %`);
   }
   if (f.outages.count) add(`end of ${f.outages.count} outages, RMS`, `${digits(f.outages.horizontal_m.rmse)} m`);
+  if (f.availability.usable !== undefined) add("usable", `${(100 * f.availability.usable).toFixed(1)} %`);
   add("valid or coasting", `${(100 * (f.availability.valid + f.availability.coasting)).toFixed(1)} %`);
 }
 

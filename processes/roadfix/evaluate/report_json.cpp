@@ -130,6 +130,7 @@ Json channel_json(const ChannelScore& c) {
                           {"coasting", c.availability.coasting},
                           {"invalid", c.availability.invalid},
                           {"silent", c.availability.silent}};
+  if (c.usable) json["availability"]["usable"] = *c.usable;
   if (c.latency) json["latency_s"] = summary(*c.latency);
   return json;
 }

@@ -107,8 +107,9 @@ std::string channel_text(const ChannelScore& c) {
   if (c.pairs > 0) text += axes_rows(c.axes) + honesty_rows(c.honesty) + trajectory_lines(c);
   text += outage_lines(c);
   const Availability& a = c.availability;
-  text += fmt::format("  valid {}, coasting {}, invalid {}, silent {} of the time\n", percent(a.valid),
+  text += fmt::format("  valid {}, coasting {}, invalid {}, silent {} of the time", percent(a.valid),
                       percent(a.coasting), percent(a.invalid), percent(a.silent));
+  text += c.usable ? fmt::format("; usable {}\n", percent(*c.usable)) : "\n";
   if (c.latency)
     text += fmt::format("  latency {} s median, {} s max\n", number(c.latency->median), number(c.latency->max));
   return text + "\n";
@@ -135,7 +136,7 @@ std::string overview(const EvaluationReport& report) {
                         any ? number(c.axes.vertical.rms) : "-",
                         any && c.axes.yaw ? number(c.axes.yaw->rms / kDegree) : "-",
                         c.honesty.position.samples > 0 ? percent(c.honesty.position.within_3sigma) : "-",
-                        fmt::format("{:.1f} %", 100.0 * (c.availability.valid + c.availability.coasting)));
+                        c.usable ? fmt::format("{:.1f} %", 100.0 * *c.usable) : "-");
   }
   return text;
 }

@@ -67,7 +67,6 @@ DriveReference make_reference(const Drive& drive, const ChangedGnss& changed, co
   facts.name = description.name;
   facts.score = description.score;
   facts.outages = changed.outages;
-  facts.score_withheld_only = changes.keep_every > 1;
   facts.reference.of = description.reference.of;
   facts.reference.attitude = description.reference.attitude;
   facts.reference.sigma_m = description.reference.sigma;
@@ -91,6 +90,7 @@ DriveReference make_reference(const Drive& drive, const ChangedGnss& changed, co
   } else {
     facts.reference = {};
   }
+  facts.score_withheld_only = changes.keep_every > 1 && facts.reference.from_fixes;
   mark(fixes, changed, facts.score.fix_types, result.poses);
   if (!drive.gnss.empty()) {
     facts.first_fix_us = drive.gnss.front().t_us;

@@ -1,5 +1,7 @@
 #include "roadfix/import/source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "config/config_error.h"
@@ -17,22 +19,65 @@ const std::vector<std::string>& source_formats() {
   return formats;
 }
 
+namespace {
+
+/// What lies in a folder of a format: of each row at least one name; "*" begins a name of which the end counts. Signs
+/// are names that tell the format where a row is missing.
+struct Layout {
+  const char* format;
+  const char* called;
+  std::vector<std::vector<std::string>> rows;
+  std::vector<std::string> signs;
+};
+
+const std::vector<Layout>& layouts() {
+  static const std::vector<Layout> all = {
+      {"folder", "a drive folder", {{"drive.yaml"}}, {"imu.csv", "imu.csv.gz", "gnss.csv", "wheels.csv"}},
+      {"euroc", "EuRoC", {{"mav0"}}, {}},
+      {"euroc", "the inside of EuRoC's mav0", {{"imu0"}, {"cam0"}}, {"imu0", "cam0"}},
+      {"kitti", "KITTI odometry", {{"calib.txt"}, {"image_0", "image_2"}}, {"calib.txt", "image_0", "image_2"}},
+      {"poses", "files of poses", {{"*_times.txt"}}, {"*_gt.txt"}},
+  };
+  return all;
+}
+
+bool has(const fs::path& folder, const std::string& name) {
+  std::error_code ignored;
+  if (name.front() != '*') return fs::exists(folder / name, ignored);
+  const fs::directory_iterator entries(folder, ignored);
+  return std::any_of(begin(entries), end(entries), [&](const fs::directory_entry& entry) {
+    return entry.path().filename().string().ends_with(name.substr(1));
+  });
+}
+
+/// The rows of which nothing is there, as a reader would say them: "calib.txt, image_0 or image_2".
+std::string missing(const fs::path& folder, const Layout& layout) {
+  std::string text;
+  for (const std::vector<std::string>& names : layout.rows) {
+    if (std::any_of(names.begin(), names.end(), [&](const std::string& name) { return has(folder, name); })) continue;
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", fmt::join(names, " or "));
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string detect_format(const fs::path& source) {
   std::error_code ignored;
-  const auto has = [&](const char* name) { return fs::exists(source / name, ignored); };
   if (!fs::exists(source, ignored)) throw ConfigError(source.string(), 0, "no such file or folder");
   if (fs::is_regular_file(source, ignored)) return "poses";
   if (!fs::is_directory(source, ignored)) throw ConfigError(source.string(), 0, "is neither a folder nor a file");
-  if (has("drive.yaml")) return "folder";
-  if (has("mav0") || (has("imu0") && has("cam0"))) return "euroc";
-  if (has("calib.txt") && (has("image_0") || has("image_2"))) return "kitti";
-  for (const auto& entry : fs::directory_iterator(source)) {
-    if (entry.path().filename().string().ends_with("_times.txt")) return "poses";
+  std::string lacks, likely;
+  for (const Layout& layout : layouts()) {
+    const std::string missed = missing(source, layout);
+    if (missed.empty()) return layout.format;
+    const auto sign = std::find_if(layout.signs.begin(), layout.signs.end(),
+                                   [&](const std::string& name) { return has(source, name); });
+    if (sign != layout.signs.end() && likely.empty())
+      likely = fmt::format("looks like {}, as {} is there, but {} is missing", layout.called, *sign, missed);
+    lacks += fmt::format("{}for {} {} is missing", lacks.empty() ? "" : "; ", layout.called, missed);
   }
-  throw ConfigError(
-      source.string(), 0,
-      "is no format known here: a drive folder has drive.yaml, KITTI odometry calib.txt and image_0, EuRoC "
-      "mav0, poses NAME_times.txt beside NAME_*.txt");
+  throw ConfigError(source.string(), 0, "is no format known here: " + (likely.empty() ? lacks : likely));
 }
 
 Drive read_source(const fs::path& source, const SourceOptions& options) {

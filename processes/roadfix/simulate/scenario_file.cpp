@@ -39,7 +39,7 @@ std::string scenario_text(const ScenarioConfig& config) {
   ScenarioFile file;
   file.config = config;
   if (is_scenario(config.name)) file.base = config.name;
-  return config_text(file);
+  return explained_config_text(file);
 }
 
 }  // namespace roadfix

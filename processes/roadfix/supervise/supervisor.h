@@ -17,7 +17,7 @@
 
 namespace roadfix {
 
-/// One program of configs/<vehicle>/run.yaml.
+/// One program of configs/VEHICLE/run.yaml.
 struct SupervisedProcess {
   std::string name;                    ///< what people call it; the program's name where `program` is empty
   std::string program;                 ///< looked for beside roadfix first, then in PATH
@@ -27,7 +27,7 @@ struct SupervisedProcess {
   bool realtime_optional = false;      ///< as everybody where the system allows no real time
 };
 
-/// configs/<vehicle>/run.yaml: what makes up the vehicle's stack.
+/// configs/VEHICLE/run.yaml: what makes up the vehicle's stack.
 struct RunConfig {
   std::string bus = "udpm://239.255.76.67:7667?ttl=0";
   std::vector<SupervisedProcess> processes;  ///< in the order of their start

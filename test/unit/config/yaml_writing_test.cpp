@@ -26,6 +26,16 @@ TEST_CASE("defaults are written out and unknown values are left out") {
   CHECK_THAT(text, !Catch::Contains("x_m"));
 }
 
+TEST_CASE("an explained text names what else a choice could be, and reads back as the same values") {
+  SampleConfig config;
+  config.modes = {test::Mode::kOrb};
+  const std::string text = explained_config_text(config);
+  CHECK_THAT(text, Catch::Contains("\nmode: klt  # or: orb\n"));
+  CHECK_THAT(text, Catch::Contains("\nmodes: [orb]  # or: klt\n"));
+  CHECK(config_text(parse_config<SampleConfig>(text, "explained.yaml")) == config_text(config));
+  CHECK_THAT(config_text(config), !Catch::Contains("#"));
+}
+
 TEST_CASE("written values come back with the same bits") {
   std::mt19937_64 random(7);
   SampleConfig config;

@@ -86,6 +86,35 @@ TEST_CASE("where fixes were thinned out the withheld ones alone are scored") {
   CHECK(report.pairs == 600);
 }
 
+TEST_CASE("fixes that were thinned out leave a reference of another origin whole") {
+  const Reference reference = exact_reference();
+  DriveFacts facts = exact_facts();
+  facts.score_withheld_only = true;
+  const auto estimate = estimate_of(eight_trajectory(0.0, 200.0, 0.1));
+  CHECK(evaluate_channel(reference, facts, estimate, {}).pairs > 1900);
+  facts.reference.from_fixes = true;
+  CHECK(evaluate_channel(reference, facts, estimate, {}).pairs == 0);
+}
+
+TEST_CASE("usable is a pose that is near, not one that is only there") {
+  const Reference reference = exact_reference();
+  const auto coasting_away = [](double off_m) {
+    return changed(eight_trajectory(0.0, 200.0, 0.1), [off_m](Odometry& pose) {
+      if (pose.t_us < 100 * kSecond) return;
+      pose.validity = Validity::kCoasting;
+      pose.T_frame_vehicle.p.x() += off_m;
+    });
+  };
+  const ChannelScore lost = evaluate_channel(reference, exact_facts(), estimate_of(coasting_away(2000.0)), {});
+  CHECK(lost.availability.valid + lost.availability.coasting == Approx(1.0));
+  REQUIRE(lost.usable);
+  CHECK(*lost.usable == Approx(0.5).margin(0.01));
+  CHECK(*evaluate_channel(reference, exact_facts(), estimate_of(coasting_away(2.0)), {}).usable == Approx(1.0));
+  const EvaluationOptions strict{.usable_within = 1.0};
+  CHECK(*evaluate_channel(reference, exact_facts(), estimate_of(coasting_away(2.0)), strict).usable ==
+        Approx(0.5).margin(0.01));
+}
+
 TEST_CASE("the antenna's reference is compared with the antenna") {
   const Eigen::Vector3d lever_arm(1.2, 0.3, 1.5);
   Reference reference = exact_reference();
@@ -271,6 +300,8 @@ TEST_CASE("an estimate without figures says why") {
   CHECK_THAT(why(good, late), Contains("its last valid pose is 20.0 s before the first that is scored"));
   DriveFacts withheld = exact_facts();
   withheld.score_withheld_only = true;
+  CHECK(why(good, withheld).empty());  // the truth is of another origin than the fixes
+  withheld.reference.from_fixes = true;
   CHECK_THAT(why(good, withheld), Contains("no fix that was withheld"));
   Trajectory standing = good;
   for (Odometry& pose : standing.poses) pose.T_frame_vehicle.p.setZero();

@@ -57,7 +57,7 @@ TEST_CASE("files whose times share no moment are refused with both spans and wha
       text += "\n" + std::to_string(change(std::stoll(line.substr(0, comma)))) + line.substr(comma);
     }
     test::write_file(drive / file, text + "\n");
-    return import(folder.path(), "drive --out a.lcm");
+    return import(folder.path(), "drive --out a.lcm --overwrite");
   };
   const std::string spans =
       " shares no moment with drive/imu.csv, 1700000000000000 to 1700000002950000: it looks like ";
@@ -67,7 +67,7 @@ TEST_CASE("files whose times share no moment are refused with both spans and wha
   CHECK_THAT(outcome.text, Catch::Contains("drive/gnss.csv: utime_us from 1700000000000 to 1700000002750" + spans +
                                            "milliseconds" + advice));
   CHECK_FALSE(fs::exists(folder / "a.lcm"));
-  CHECK(import(folder.path(), "drive --out a.lcm --without gnss").code == 0);
+  CHECK(import(folder.path(), "drive --out a.lcm --overwrite --without gnss").code == 0);
   outcome = with_stamps("wheels.csv", [](int64_t t_us) { return t_us / 1'000'000; });
   CHECK(outcome.code == 2);
   CHECK_THAT(outcome.text,
@@ -78,7 +78,7 @@ TEST_CASE("files whose times share no moment are refused with both spans and wha
   outcome = with_stamps("mag.csv", [](int64_t t_us) { return t_us + 3'600'000'000; });  // an hour: another clock
   CHECK(outcome.code == 2);
   CHECK_THAT(outcome.text, Catch::Contains("drive/mag.csv") && !Catch::Contains("looks like"));
-  CHECK(import(folder.path(), "drive --out a.lcm --without mag").code == 0);
+  CHECK(import(folder.path(), "drive --out a.lcm --overwrite --without mag").code == 0);
   CHECK(with_stamps("gnss.csv", [](int64_t t_us) { return t_us + 2'900'000; }).code ==
         0);  // with the IMU 50 ms, with pictures none
 }
@@ -88,20 +88,21 @@ TEST_CASE("a user's mistake ends with exit code 2 and a line that names it") {
   fs::create_directories(folder / "drive");
   test::write_small_drive(folder / "drive");
   const std::vector<std::pair<std::string, std::string>> mistakes = {
-      {"nowhere --out a.lcm", "roadfix: nowhere: no such file or folder"},
+      {"nowhere --out a.lcm", "roadfix import: nowhere: no such file or folder"},
       {"drive", "--out is required"},
       {"drive --out a.lcm --format rosbag", "--format"},
       {"drive --out a.lcm --without radar", "--without"},
       {"drive --out a.lcm --cut-gnss 1", "--cut-gnss requires --every"},
-      {"drive --out a.lcm --cut-gnss 5 --every 1", "roadfix: --every must not be shorter than --cut-gnss"},
+      {"drive --out a.lcm --cut-gnss 5 --every 1", "roadfix import: --every must not be shorter than --cut-gnss"},
       {"drive --out a.lcm --cut-gnss inf --every inf", "--cut-gnss"},
       {"drive --out a.lcm --cut-gnss 1 --every 5 --after nan", "--after"},
       {"drive --out a.lcm --gnss-spike nan --every-fix 2", "--gnss-spike"},
       {"drive --out a.lcm --gnss-bias-after-outage 15", "--gnss-bias-after-outage requires --cut-gnss"},
       {"drive --out a.lcm --gnss-every 0", "--gnss-every"},
-      {"drive --out a.lcm --gnss-every 2 --without gnss", "roadfix: there are no fixes to cut, thin out or move"},
+      {"drive --out a.lcm --gnss-every 2 --without gnss",
+       "roadfix import: there are no fixes to cut, thin out or move"},
       {"drive --out no/such/folder/a.lcm", "no/such/folder/a.lcm"},
-      {"drive --out a.lcm --start-after 1e9", "roadfix: nothing is left of the drive"},
+      {"drive --out a.lcm --start-after 1e9", "roadfix import: nothing is left of the drive"},
   };
   for (const auto& [arguments, words] : mistakes) {
     const Outcome outcome = import(folder.path(), arguments);

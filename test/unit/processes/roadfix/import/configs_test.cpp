@@ -55,7 +55,7 @@ TEST_CASE("written defaults change nothing and can be switched on line by line")
     uncommented += text.substr(at + 2, end - at - 1);
     at = end + 1;
   }
-  CHECK(uncommented == before);
+  CHECK(uncommented == make_stages({stage}, folder.path()).front()->explained_config());
   test::write_file(folder / (stage + ".yaml"), uncommented);
   CHECK(make_stages({stage}, folder.path()).front()->effective_config() == before);
   const std::string changed = "publish_period_s: 0.5\n";
@@ -64,6 +64,20 @@ TEST_CASE("written defaults change nothing and can be switched on line by line")
   CHECK(test::read_file(folder / (stage + ".yaml")) == changed);
   test::write_file(folder / (stage + ".yaml"), "publish_period_ms: 5\n");
   CHECK_THROWS_WITH(make_stages({stage}, folder.path()), Catch::Contains("did you mean publish_period_s?"));
+}
+
+TEST_CASE("a vehicle without a camera is not told that the visual stage lacks one") {
+  const test::TemporaryFolder folder;
+  test::write_file(folder / "calibration.yaml", "body_origin: imu\nsensors: {imu: {rate_hz: 100}}\n");
+  CHECK(write_process_defaults(folder.path()).empty());
+  CHECK(std::filesystem::exists(folder / "wheel_odometry.yaml"));
+  CHECK_FALSE(std::filesystem::exists(folder / "vo_tracker.yaml"));
+  // One whose camera has no lens is.
+  const std::string with_camera = "body_origin: imu\nsensors: {imu: {rate_hz: 100}, camera_left: {rate_hz: 10}}\n";
+  test::write_file(folder / "calibration.yaml", with_camera);
+  const std::vector<std::string> remarks = write_process_defaults(folder.path());
+  REQUIRE(remarks.size() == 1);
+  CHECK_THAT(remarks.front(), Catch::StartsWith("vo_tracker: "));
 }
 
 }  // namespace

@@ -183,9 +183,17 @@ TEST_CASE("a broken file of each format gives the error a user needs") {
   }
 }
 
-TEST_CASE("a folder of no known format says what each format needs") {
+TEST_CASE("a folder of no known format says what each format misses in it") {
   const test::TemporaryFolder folder;
-  CHECK_THAT(error_of(folder.path()), Catch::Contains("is no format known here: a drive folder has drive.yaml"));
+  CHECK_THAT(error_of(folder.path()),
+             Catch::Contains("is no format known here: for a drive folder drive.yaml is missing"));
+  CHECK_THAT(error_of(folder.path()), Catch::Contains("for KITTI odometry calib.txt, image_0 or image_2 is missing"));
+  test::write_file(folder / "calib.txt", "");
+  CHECK_THAT(error_of(folder.path()),
+             Catch::Contains("looks like KITTI odometry, as calib.txt is there, but image_0 or image_2 is missing"));
+  test::write_file(folder / "imu.csv", "");
+  CHECK_THAT(error_of(folder.path()),
+             Catch::EndsWith("looks like a drive folder, as imu.csv is there, but drive.yaml is missing"));
   CHECK_THAT(error_of(folder.path() / "none"), Catch::Contains("none: no such file or folder"));
 }
 

@@ -9,9 +9,9 @@ drive=(car_park --seed 3 --duration 8 --threads 1)
 eye=(--mono --camera-rate-hz 2 --picture-size 64x48)
 # Without the first message, which names the scenario with its faults.
 simulate() { "$roadfix" simulate "${drive[@]}" "$@" >/dev/null 2>&1; }
-messages() { "$roadfix" log cut "$1" --from-s 0.5 --out "$folder/cut.lcm" >/dev/null && mv "$folder/cut.lcm" "$2"; }
-simulate --out "$folder/drive.lcm" && messages "$folder/drive.lcm" "$folder/blind.lcm"
-simulate "${eye[@]}" --out "$folder/drive.lcm" && messages "$folder/drive.lcm" "$folder/seeing.lcm"
+messages() { "$roadfix" log cut "$1" --from-s 0.5 --out "$folder/cut.lcm" --overwrite >/dev/null && mv "$folder/cut.lcm" "$2"; }
+simulate --overwrite --out "$folder/drive.lcm" && messages "$folder/drive.lcm" "$folder/blind.lcm"
+simulate "${eye[@]}" --overwrite --out "$folder/drive.lcm" && messages "$folder/drive.lcm" "$folder/seeing.lcm"
 names=$("$roadfix" simulate --list | grep -oE '\b(imu|gnss|wheels|mag|camera)\.[a-z_]+' | sort -u)
 [[ $(wc -w <<<"$names") -ge 50 ]] || { echo "only these faults are listed: $names"; exit 1; }
 for name in $names; do
@@ -25,9 +25,9 @@ for name in $names; do
   fault=(--fault "$name@2+4$values")
   plain=$folder/blind.lcm
   if [[ $name == camera.* ]]; then fault+=("${eye[@]}"); plain=$folder/seeing.lcm; fi
-  simulate "${fault[@]}" --out "$folder/flag.lcm"
+  simulate "${fault[@]}" --overwrite --out "$folder/flag.lcm"
   "$roadfix" simulate "${drive[@]}" "${fault[@]}" --print-config >"$folder/drive.yaml"
-  "$roadfix" simulate "$folder/drive.yaml" --seed 3 --threads 1 --out "$folder/file.lcm" >/dev/null 2>&1
+  "$roadfix" simulate "$folder/drive.yaml" --seed 3 --threads 1 --overwrite --out "$folder/file.lcm" >/dev/null 2>&1
   cmp "$folder/flag.lcm" "$folder/file.lcm" || { echo "$name: not the same from a file"; exit 1; }
   messages "$folder/flag.lcm" "$folder/faulty.lcm"
   ! cmp -s "$folder/faulty.lcm" "$plain" || { echo "$name: changes nothing"; exit 1; }
