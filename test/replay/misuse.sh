@@ -51,8 +51,8 @@ said 2 'neither a folder nor a file' import /dev/null --out x.lcm
 said 0 'POSE_WHEEL' evaluate out.lcm --channel POSE_WHEEL --channel POSE_WHEEL --out report
 ! grep -q 'no figures' out || fail 'a channel named twice has no figures'
 said 0 'never acts: the drive ends at 2 s' simulate standing --no-camera --duration 2 --fault gnss.silence@2 --out s.lcm
-said 0 'never acts: there is no camera' simulate standing --no-camera --duration 2 --fault camera.dark@1 --out s.lcm
-said 0 's.lcm' simulate standing --no-camera --duration 2 --fault gnss.silence@1 --out s.lcm
+said 0 'never acts: there is no camera' simulate standing --no-camera --duration 2 --fault camera.dark@1 --overwrite --out s.lcm
+said 0 's.lcm' simulate standing --no-camera --duration 2 --fault gnss.silence@1 --overwrite --out s.lcm
 ! grep -q 'never acts' out || fail 'a fault that acts is said not to'
 [[ $bad -eq 0 ]] && echo told
 exit $bad

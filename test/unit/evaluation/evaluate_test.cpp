@@ -110,7 +110,8 @@ TEST_CASE("usable is a pose that is near, not one that is only there") {
   REQUIRE(lost.usable);
   CHECK(*lost.usable == Approx(0.5).margin(0.01));
   CHECK(*evaluate_channel(reference, exact_facts(), estimate_of(coasting_away(2.0)), {}).usable == Approx(1.0));
-  const EvaluationOptions strict{.usable_within = 1.0};
+  EvaluationOptions strict;
+  strict.usable_within = 1.0;
   CHECK(*evaluate_channel(reference, exact_facts(), estimate_of(coasting_away(2.0)), strict).usable ==
         Approx(0.5).margin(0.01));
 }
