@@ -1,6 +1,8 @@
 /// HEALTH and HEARTBEAT_MONITOR onto a bus.
 #pragma once
 
+#include <optional>
+
 #include "bus/bus.h"
 #include "bus/run/process_facts.h"
 #include "bus/run/unsent_watch.h"
@@ -13,11 +15,16 @@ class HealthPublisher : public MonitorListener {
   /// `heartbeat`: false where a log is read; nothing lives there.
   HealthPublisher(Bus& bus, double period_s, bool heartbeat);
 
+  /// Live: where HEALTH comes from a monitor that has run for longer, this one shows and is silent, until the other is.
+  /// For that it listens for a while before its first word.
+  void heard(const BusMessage& message, int64_t now_us);
+
   void message(const std::string&, const std::string&, const BusMessage&, int64_t) override {}
   void decided(const HealthReport& report, bool changed) override;
 
  private:
   void publish_heartbeat(int64_t now_us);
+  [[nodiscard]] bool must_be_silent(int64_t now_us) const;
 
   Bus& bus_;
   int64_t period_us_;
@@ -27,6 +34,7 @@ class HealthPublisher : public MonitorListener {
   int64_t run_ = 0;
   int64_t seq_ = 0, heartbeat_seq_ = 0;
   int64_t published_us_ = 0, heartbeat_us_ = 0;
+  std::optional<int64_t> other_us_;  ///< when an older monitor was heard last
 };
 
 }  // namespace roadfix

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "bus/log/log_writer.h"
+#include "bus/log/merged_logs.h"
 #include "bus/log/output_place.h"
 #include "bus/run/run_clock.h"
 #include "bus/run/run_process.h"
@@ -15,7 +16,6 @@
 #include "monitor/handler.h"
 #include "monitor/health_publisher.h"
 #include "monitor/host_facts.h"
-#include "bus/log/merged_logs.h"
 #include "monitor/terminal.h"
 
 namespace roadfix {
@@ -25,16 +25,31 @@ namespace {
 constexpr auto kPatience = std::chrono::milliseconds(50);
 /// Of the share that is read: only what follows the last message makes it whole.
 constexpr double kNotDone = 0.999;
+/// Beyond the configured one, where a monitor that `roadfix run` started has that already.
+constexpr int kPortsTried = 9;
 
 std::unique_ptr<Dashboard> dashboard_of(const MonitorOptions& options, const MonitorConfig& config, Health& health,
                                         const std::string& name) {
   if (options.no_dashboard || !options.log_out.empty()) return nullptr;
-  try {
-    return std::make_unique<Dashboard>(config.dashboard, health, name, !options.logs.empty());
-  } catch (const ListenError& e) {
-    if (!options.listen.empty() || !options.logs.empty()) throw;  // the page is what was asked for
-    std::cerr << e.what() << "; the monitor goes on without it\n";
-    return nullptr;
+  DashboardConfig wanted = config.dashboard;
+  const ServerOptions first = parse_listen(wanted.listen);
+  std::string taken;
+  for (int port = first.port;; ++port) {
+    try {
+      auto dashboard = std::make_unique<Dashboard>(wanted, health, name, !options.logs.empty());
+      if (!taken.empty()) std::cerr << "monitor: " << taken << "; this one's page is " << dashboard->url() << std::endl;
+      return dashboard;
+    } catch (const ListenError& e) {
+      if (!options.listen.empty()) throw std::runtime_error(std::string(e.what()) + "; give another --listen");
+      if (taken.empty()) taken = e.what();
+      if (!e.taken || port == first.port + kPortsTried) {
+        std::cerr << "monitor: " << taken << "; the monitor goes on without a page" << std::endl;
+        return nullptr;
+      }
+    }
+    const std::string address =
+        first.address.find(':') == std::string::npos ? first.address : "[" + first.address + "]";
+    wanted.listen = address + ":" + std::to_string(port + 1);
   }
 }
 
@@ -51,7 +66,10 @@ void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   handler.add(publisher);
   if (dashboard) handler.add(dashboard->view());
   handler.add(terminal);
-  bus.subscribe(".*", [&](const BusMessage& message) { handler.take(message, clock.now_utime()); });
+  bus.subscribe(".*", [&](const BusMessage& message) {
+    publisher.heard(message, clock.now_utime());
+    handler.take(message, clock.now_utime());
+  });
   ServiceNotifier service;
   service.ready("on " + options.bus);
   while (!stop_requested()) {

@@ -28,11 +28,20 @@ printf 'min_free_gib: 0\n' >vehicle/recorder.yaml
 "$bin/roadfix" run vehicle >said 2>err & run=$!
 for _ in $(seq 100); do [[ $(grep -c started said) -ge $(grep -c 'name:' vehicle/run.yaml) ]] && break; sleep 0.1; done
 sleep 2
+# README's page is that of the monitor which runs; another one takes another port, is silent, and says both.
+"$bin/monitor" --config vehicle --plain >/dev/null 2>second & second=$!
+for _ in $(seq 600); do grep -q 'only shows' second && break; sleep 0.1; done
+grep -q '^monitor: dashboard: cannot listen on 127.0.0.1:8420: Address already in use (monitor, process [0-9]*); this one.s page is http://127.0.0.1:8421/$' second ||
+  fail "a second monitor: $(cat second)"
+grep -q 'another monitor publishes HEALTH here; this one only shows' second || fail "a second monitor: $(cat second)"
+status=0; "$bin/monitor" --plain --listen 127.0.0.1:8420 2>third >/dev/null || status=$?
+[[ $status -eq 2 ]] && grep -q 'monitor, process [0-9]*); give another --listen' third || fail "a third monitor: $status, $(cat third)"
 lcm-logplayer cut.lcm >/dev/null 2>&1 & player=$!
 sleep 5
 kill -KILL "$(sed -n 's/^gnss_ins_ekf started, process //p' said)"
 wait $player
 sleep 0.5
+kill $second
 kill -INT $run
 wait $run || fail "ended with $?"
 grep -q 'gnss_ins_ekf was killed by signal 9 .*starts again in' said || fail 'the death was not said'

@@ -10,6 +10,7 @@
 #include <charconv>
 #include <vector>
 
+#include "monitor/web/port_holder.h"
 #include "monitor/web/request.h"
 
 namespace roadfix {
@@ -80,8 +81,11 @@ class DashboardServer::Connections {
                                MHD_OPTION_CONNECTION_MEMORY_LIMIT, kRequestBytes, MHD_OPTION_NOTIFY_CONNECTION,
                                &on_connection, this, MHD_OPTION_END);
     if (daemon_ == nullptr) {
+      const int why = errno;
+      const std::optional<std::string> holder = why == EADDRINUSE ? port_holder(options.port) : std::nullopt;
       throw ListenError("dashboard: cannot listen on " + options.address + ":" + std::to_string(options.port) + ": " +
-                        std::strerror(errno));
+                            std::strerror(why) + (holder && !holder->empty() ? " (" + *holder + ")" : ""),
+                        why == EADDRINUSE);
     }
   }
   ~Connections() {

@@ -22,7 +22,8 @@ struct ServerError : std::runtime_error {
 
 /// The address is right, but taken, or not this machine's.
 struct ListenError : ServerError {
-  using ServerError::ServerError;
+  ListenError(const std::string& text, bool is_taken) : ServerError(text), taken(is_taken) {}
+  bool taken;  ///< another program listens there
 };
 
 struct ServerOptions {

@@ -1,5 +1,6 @@
 // Messages as they come from the bus, told to lib/health.
 #include <catch2/catch.hpp>
+#include <roadfix/health_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/pose_t.hpp>
@@ -160,6 +161,8 @@ TEST_CASE("the monitor says what the network did not take of its own messages") 
     HealthReport report;
     bus.gone = gone;
     report.now_us = kStart_us;
+    publisher.decided(report, true);  // listens
+    report.now_us += 1'300'000;
     publisher.decided(report, true);  // HEALTH and a heartbeat
     bus.gone = false;
     report.now_us += 1'000'000;
@@ -167,4 +170,37 @@ TEST_CASE("the monitor says what the network did not take of its own messages") 
     CHECK(h.state == (gone ? heartbeat_t::STATE_DEGRADED : heartbeat_t::STATE_RUNNING));
     CHECK(h.state_reason == (gone ? "the network did not take 2 messages" : ""));
   }
+}
+
+TEST_CASE("of two monitors the younger is silent, and speaks when the older is gone") {
+  test::OutageBus bus;
+  HealthPublisher publisher(bus, 0.5, true);
+  HealthReport report;
+  int heard = 0;
+  bus.subscribe("HEALTH", [&heard](const BusMessage&) { ++heard; });
+  const auto published = [&](int64_t after_us) {
+    heard = 0;
+    report.now_us = kStart_us + after_us;
+    publisher.decided(report, true);
+    while (bus.handle(std::chrono::milliseconds(0))) continue;
+    return heard == 1;
+  };
+  const auto hear = [&](int64_t run, int64_t after_us) {
+    health_t other{};
+    other.utime = kStart_us + after_us;
+    other.run = run;
+    const std::vector<uint8_t> bytes = encode(other);
+    publisher.heard({"HEALTH", bytes, other.utime}, other.utime);
+  };
+  CHECK_FALSE(published(0));
+  CHECK_FALSE(published(1'000'000));
+  CHECK(published(1'300'000));
+  hear(kStart_us + 900'000, 1'400'000);  // younger: that one has to be silent
+  CHECK(published(1'500'000));
+  hear(kStart_us, 1'600'000);  // its own, come back
+  CHECK(published(1'700'000));
+  hear(kStart_us - 60'000'000, 2'000'000);
+  CHECK_FALSE(published(2'100'000));
+  CHECK_FALSE(published(4'900'000));
+  CHECK(published(5'100'000));
 }

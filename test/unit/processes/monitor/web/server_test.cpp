@@ -9,6 +9,8 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 
+#include "monitor/web/port_holder.h"
+
 using namespace roadfix;
 
 namespace {
@@ -142,6 +144,20 @@ TEST_CASE("an address that is taken is told as such") {
   ServerOptions same = any_port();
   same.port = std::stoi(address(first).substr(address(first).rfind(':') + 1));
   CHECK_THROWS_AS(DashboardServer(board, same), ListenError);
+  const std::string us = "process " + std::to_string(::getpid());
+  CHECK_THROWS_WITH(DashboardServer(board, same), Catch::Contains(us));
+  CHECK_THAT(*port_holder(same.port), Catch::EndsWith(us));
+}
+
+TEST_CASE("nobody holds a port that is free") {
+  int port = 0;
+  {
+    Board board("x", false);
+    const DashboardServer server(board, any_port());
+    port = std::stoi(address(server).substr(address(server).rfind(':') + 1));
+    CHECK(port_holder(port));
+  }
+  CHECK_FALSE(port_holder(port));
 }
 
 TEST_CASE("no more connections than allowed, and idle ones make room again") {
