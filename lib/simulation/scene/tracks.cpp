@@ -53,10 +53,18 @@ struct Track {
   SurfacePoint point;
   Eigen::Vector2d offset = Eigen::Vector2d::Zero();  // px, of a mismatch
   bool mismatched = false;
-  double noise_px = 0.0;
+  double noise_px = 0.0, walk_px = 0.0;
+  Eigen::Vector2d walked = Eigen::Vector2d::Zero();  // px
 };
 
 }  // namespace
+
+TrackConfig with_noise_of_pictures(TrackConfig config) {
+  config.noise_px = 0.1;
+  config.walk_px = 0.15;
+  config.noise_spread = 0.5;
+  return config;
+}
 
 struct TrackSimulator::Impl {
   const World& world;
@@ -120,10 +128,18 @@ struct TrackSimulator::Impl {
     return track.noise_px * Eigen::Vector2d(u, v);
   }
 
-  /// Of a new track.
-  double noise_px() {
-    return config.noise_spread > 0.0 ? config.noise_px * std::exp(config.noise_spread * random.normal())
-                                     : config.noise_px;
+  /// Gives a new track its noise.
+  void draw_noise(Track& track) {
+    const double factor = config.noise_spread > 0.0 ? std::exp(config.noise_spread * random.normal()) : 1.0;
+    track.noise_px = config.noise_px * factor;
+    track.walk_px = config.walk_px * factor;
+  }
+
+  void walk(Track& track) {
+    if (!(config.walk_px > 0.0)) return;
+    const double u = random.normal();
+    const double v = random.normal();
+    track.walked += track.walk_px * Eigen::Vector2d(u, v);
   }
 
   std::optional<TrackObservation> observe_one(Track& track, const View& view, const RayWindow& window) {
@@ -138,13 +154,13 @@ struct TrackSimulator::Impl {
     }
     TrackObservation o;
     o.id = track.id;
-    o.left = *pixel + track.offset + noise(track);
+    o.left = *pixel + track.offset + track.walked + noise(track);
     o.p_enu = p;
     o.is_outlier = track.mismatched || track.point.mover >= 0;
     if (!left.sees(o.left)) return std::nullopt;
     if (right) {
       const auto other = sees(right->camera, view.T_enu_camera * right->T_left_right, window, p);
-      if (other) o.right = *other + track.offset + noise(track);
+      if (other) o.right = *other + track.offset + track.walked + noise(track);
       if (o.right && !right->camera.sees(*o.right)) o.right.reset();
     }
     return o;
@@ -208,7 +224,7 @@ struct TrackSimulator::Impl {
       const auto pixel = left.project(p);
       if (!pixel || !left.sees(*pixel, kBorder_px) || !buckets.take(*pixel)) continue;
       Track track{next_id, point};
-      track.noise_px = noise_px();
+      draw_noise(track);
       auto o = observe_one(track, view, window);
       if (!o) continue;
       ++next_id;
@@ -231,6 +247,7 @@ std::vector<TrackObservation> TrackSimulator::observe(const View& view) {
   std::vector<Track> alive;
   for (Track& track : s.tracks) {
     if (s.random.uniform() < s.config.loss_per_frame) continue;
+    s.walk(track);
     const auto o = s.observe_one(track, view, window);
     if (!o) continue;
     buckets.take(o->left);

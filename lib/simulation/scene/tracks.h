@@ -21,6 +21,9 @@ struct TrackConfig {
   /// Tracks differ: standard deviation of the logarithm of a track's own noise, whose median noise_px is then. Zero:
   /// all are alike.
   double noise_spread = 0.0;
+  /// Standard deviation of u and of v by which a track's error moves from picture to picture, as that of a patch does in
+  /// drawn and real pictures (tools/experiments/track_noise); a track's own is as much more or less as its noise is.
+  double walk_px = 0.0;
   double nearest_m = 1.0;
   double farthest_m = 60.0;
   double loss_per_frame = 0.03;       ///< share of tracks that end though their point is still to be seen
@@ -29,6 +32,9 @@ struct TrackConfig {
   double darkest = 0.0015;            ///< light (Face::light) below which nothing is found
   bool moving_cars = true;            ///< their points are outliers from the start
 };
+
+/// Noise along tracks as optical flow has it on drawn pictures.
+TrackConfig with_noise_of_pictures(TrackConfig config);
 
 struct TrackObservation {
   std::int64_t id = 0;                   ///< the same for one track through all its frames, never used again

@@ -39,6 +39,9 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
   for (size_t i = 0; i < sightings.size(); ++i) {
     straight_[i] = sightings[i];
     straight_[i].left.z = straightened(window_->camera, sightings[i].left.z);
+    straight_[i].sigma_px *= tuning_.noise_factor;
+    straight_[i].walk_px2 *= tuning_.noise_factor * tuning_.noise_factor;
+    straight_[i].right_sigma_px *= tuning_.noise_factor;
   }
   const std::span<const ViewSighting> seen(straight_.data(), sightings.size());
   const int anchor = seen.front().view;
@@ -56,6 +59,7 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
   eliminate_columns(work.topRows(rows), 3);
   const int dof = rows - 3;
   const double squared = nis(3, dof);
+  counts_.misfit_sum += std::min(squared / dof, tuning_.refuse);
   if (!(squared <= tuning_.refuse * dof)) {
     ++counts_.refused;
     return false;

@@ -4,24 +4,18 @@
 #pragma once
 
 #include "navigation/aiding/camera/track_rows.h"
+#include "navigation/aiding/camera/track_tuning.h"
 
 namespace roadfix::navigation {
-
-struct TrackTuning {
-  double place_px = 0.5;  ///< standard deviation of a place, all told: for the triangulation's weights
-  double refuse = 9.0;    ///< times its degrees of freedom: nis of a track that is no point of this world
-  double nearest = 0.5;   ///< m, of points from an eye
-  double tails = 2.0;     ///< degrees of freedom of Student's t over tracks
-  int min_sightings = 3;  ///< of a finished track
-};
 
 /// What an update did with the tracks that it was given.
 struct TrackCounts {
   int used = 0;
   int refused = 0;
-  int not_placed = 0;    ///< no triangulation
-  double nis_sum = 0.0;  ///< of used tracks, before their weight
-  int dof_sum = 0;       ///< likewise
+  int not_placed = 0;       ///< no triangulation
+  double nis_sum = 0.0;     ///< of used tracks, before their weight
+  int dof_sum = 0;          ///< likewise
+  double misfit_sum = 0.0;  ///< of tracks tried: nis over degrees of freedom, that of a refused one as it is refused by
 
   [[nodiscard]] int tried() const { return used + refused; }
 };

@@ -1,0 +1,177 @@
+#include "navigation/aiding/camera/camera_control.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/so3.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+constexpr int kEnoughTracks = 3;       // of an update, to judge the camera by
+constexpr double kShortestStep = 0.2;  // s, at most, that one picture counts for in the trial
+
+int64_t micros(double s) { return static_cast<int64_t>(std::llround(1e6 * s)); }
+
+}  // namespace
+
+CameraControl::CameraControl(const CameraTuning& tuning, const CameraFacts& facts)
+    : tuning_(tuning), left_(facts.left), stamps_(facts.rate, facts.stamp_jitter), update_(tuning.tracks) {
+  if (facts.right) right_.emplace(*facts.right);
+  window_.two_eyes = right_.has_value();
+}
+
+void CameraControl::add(const TrackPicture& picture, int64_t id) {
+  if (waiting_.size() >= kMostWaiting || picture.t_us <= stamps_.last_us()) return;
+  waiting_.push_back({stamps_.on_time(picture.t_us), id, picture});
+}
+
+std::optional<int64_t> CameraControl::next_us(const Mean& x) const {
+  if (waiting_.empty()) return std::nullopt;
+  return waiting_.front().t_us + micros(x.camera_offset);
+}
+
+void CameraControl::restart() {
+  tracks_.clear();
+  fitness_ = CameraFitness::kOnTrial;
+  misfit_ = trial_ = 0.0;
+  pose_us_ = 0;
+}
+
+bool CameraControl::makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const {
+  // Without parallax a picture tells nothing new, and the window keeps its baseline.
+  return !picture.points.empty() && !standing && !same && t_us - pose_us_ >= micros(tuning_.pose_interval);
+}
+
+std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
+  const int64_t t_us = *next_us(filter.state().x);
+  const Waiting now = std::move(waiting_.front());
+  waiting_.pop_front();
+  const bool same = same_picture(last_, now.picture);
+  last_ = now.picture;
+  const SeenPicture seen = seen_picture(now.picture, left_, right_ ? &*right_ : nullptr);
+  num_seen_ = static_cast<int>(seen.points.size());
+  if (!makes_pose(seen, t_us, standing, same)) {
+    tracks_.pass(seen);
+    return std::nullopt;
+  }
+  const double dt_s = pose_us_ == 0 ? 0.0 : seconds_between(pose_us_, t_us);
+  State& state = filter.state();
+  add_pose(filter, t_us);
+  tracks_.add(seen, state.clones.back().id);
+  const bool full = static_cast<int>(state.clones.size()) > tuning_.poses;
+  try_tracks(state, full);
+  judge(dt_s);
+  const TrackCounts& counts = update_.counts();
+  AidingRecord record = record_of(AidingSource::kCameraTracks, AidingStatus::kGated, now.picture.t_us, now.id);
+  record.nis = counts.nis_sum;
+  record.dof = counts.dof_sum;
+  if (fitness_ == CameraFitness::kFit && counts.used > 0) {
+    rows_.begin(state);
+    rows_.add(update_.rows(), Columns(state));
+    record.status = rows_.apply(state) ? AidingStatus::kAccepted : AidingStatus::kBadInput;
+  } else if (fitness_ != CameraFitness::kFit) {
+    record.status = AidingStatus::kBadQuality;
+  }
+  if (full) drop_oldest(state);
+  return counts.tried() > 0 ? std::optional(record) : std::nullopt;
+}
+
+void CameraControl::add_pose(Filter& filter, int64_t t_us) {
+  filter.flush();
+  State& state = filter.state();
+  const Mean& x = state.x;
+  state.move_reference(x.nav.position);
+  const Eigen::Vector3d rate = filter.motion().rate;
+  state.add_clone(next_pose_++, rate, stamps_.jitter());
+  pose_us_ = t_us;
+  // From the imu's epoch to the picture's moment.
+  const double dt = seconds_between(x.t_us, t_us);
+  Clone& pose = state.clones.back();
+  pose.t_us = t_us;
+  pose.R = pose.R * exp_so3(dt * rate);
+  pose.p += dt * x.nav.velocity;
+  const int n = state.size(), at = pose.at + 3;
+  Eigen::MatrixXd& P = state.P();
+  P.block(at, 0, 3, n) += dt * P.block(kVel, 0, 3, n);
+  P.block(0, at, n, 3) += dt * P.block(0, kVel, n, 3);
+  P.block<3, 3>(at, at) = (0.5 * (P.block<3, 3>(at, at) + P.block<3, 3>(at, at).transpose())).eval();
+  if (state.held()) state.expected().segment<3>(at) += dt * state.expected().segment<3>(kVel);
+}
+
+void CameraControl::try_tracks(const State& state, bool full) {
+  const Mean& x = state.x;
+  window_.camera = {x.T_imu_camera, x.lens, x.T_left_right};
+  window_.views.clear();
+  for (const Clone& c : state.clones) window_.views.push_back({c.R, c.p - state.p_ref});
+  const Columns columns(state);
+  const int n = columns.size();
+  window_.P.resize(n, n);
+  window_.expected.resize(state.held() ? n : 0);
+  int row = 0;
+  for (const auto& [at, height] : columns.blocks()) {
+    int column = 0;
+    for (const auto& [other, width] : columns.blocks()) {
+      window_.P.block(row, column, height, width) = state.P().block(at, other, height, width);
+      column += width;
+    }
+    if (state.held()) window_.expected.segment(row, height) = state.expected().segment(at, height);
+    row += height;
+  }
+  update_.begin(window_);
+  const int64_t oldest = state.clones.front().id;
+  int room = tuning_.tracks_per_update;
+  std::array<ViewSighting, kMaxViews> seen;
+  // Longest first: their sightings tell most, and there is a limit to what one picture may cost.
+  for (int wanted = kMaxViews; wanted >= tuning_.tracks.min_sightings && room > 0; --wanted) {
+    for (Track& track : tracks_.tracks()) {
+      if (track.count != wanted || room <= 0) continue;
+      const bool leaving = full && track.seen.front().clone == oldest;
+      if (track.alive && !leaving) continue;
+      --room;
+      for (int i = 0; i < track.count; ++i) {
+        const Sighting& s = track.seen[static_cast<size_t>(i)];
+        const auto view = static_cast<int>(state.find_clone(s.clone) - state.clones.data());
+        seen[static_cast<size_t>(i)] = {view, s.left, s.right, s.sigma_px, s.walk_px2, s.right_sigma_px};
+      }
+      (void)update_.add({seen.data(), static_cast<size_t>(track.count)});
+      track.use_up();
+    }
+  }
+  tracks_.drop_ended();
+}
+
+/// (N.6.14): a camera whose tracks do not fit what else is known, turned, late, or looking at its own cover, is not used
+/// until they have fitted for long.
+void CameraControl::judge(double dt_s) {
+  const TrackCounts& counts = update_.counts();
+  if (counts.tried() < kEnoughTracks) return;
+  const double step = std::min(dt_s, kShortestStep);
+  const double misfit = counts.misfit_sum / counts.tried();
+  const double share = 1.0 - std::exp(-step / tuning_.judged_over);
+  misfit_ += share * (misfit - misfit_);
+  switch (fitness_) {
+    case CameraFitness::kFit:
+      if (misfit_ > tuning_.unfit_above) {
+        fitness_ = CameraFitness::kUnfit;
+        trial_ = 0.0;
+      }
+      break;
+    case CameraFitness::kOnTrial:
+    case CameraFitness::kUnfit: {
+      trial_ = misfit < tuning_.fit_below ? trial_ + step : std::max(0.0, trial_ - step);
+      const double wanted = fitness_ == CameraFitness::kOnTrial ? tuning_.trial : tuning_.trial_again;
+      if (trial_ >= wanted && misfit_ < tuning_.fit_below) fitness_ = CameraFitness::kFit;
+      break;
+    }
+  }
+}
+
+void CameraControl::drop_oldest(State& state) {
+  const int64_t oldest = state.clones.front().id;
+  tracks_.forget_clone(oldest);
+  state.remove_clone(oldest);
+}
+
+}  // namespace roadfix::navigation

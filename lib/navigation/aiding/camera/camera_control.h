@@ -1,0 +1,94 @@
+/// When pictures measure the state: which become poses of the window, which tracks are used when, and whether the camera
+/// is fit to be used at all. Equations: MODEL.md beside this file.
+///
+/// A picture is used at the imu's epoch at or after its moment. One that shows no track changes nothing, not even where
+/// covariance steps begin and end.
+#pragma once
+
+#include <deque>
+
+#include "navigation/aiding/camera/camera_tuning.h"
+#include "navigation/aiding/camera/seen_picture.h"
+#include "navigation/aiding/camera/serialise_tracks.h"
+#include "navigation/aiding/camera/stamp_line.h"
+#include "navigation/aiding/camera/track_update.h"
+#include "navigation/filter.h"
+#include "navigation/update.h"
+
+namespace roadfix::navigation {
+
+/// Of the calibration.
+struct CameraFacts {
+  CameraIntrinsics left;
+  std::optional<CameraIntrinsics> right;
+  double stamp_jitter = 0.0;  ///< s, by which single stamps are late
+  double rate = 0.0;          ///< Hz; zero: not known, and late stamps stay as they are
+};
+
+/// kOnTrial: tracks are tried and not used, until enough of them fit.
+enum class CameraFitness { kOnTrial, kFit, kUnfit };
+
+class CameraControl {
+ public:
+  CameraControl(const CameraTuning& tuning, const CameraFacts& facts);
+
+  /// In the order of stamps; an older one, or one too many, is left out.
+  void add(const TrackPicture& picture, int64_t id = 0);
+  /// When the next waiting picture was taken, the imu's clock.
+  [[nodiscard]] std::optional<int64_t> next_us(const Mean& x) const;
+  /// Uses it: `filter` stands at the imu's epoch at or after its moment. Nothing where no track was tried.
+  std::optional<AidingRecord> use(Filter& filter, bool standing);
+  /// Drops it: there is no filter, or the filter is past it.
+  void skip() { waiting_.pop_front(); }
+  /// The filter began anew: poses and tracks are forgotten, what waits stays.
+  void restart();
+
+  [[nodiscard]] CameraFitness fitness() const { return fitness_; }
+  /// Tracks in the newest picture that was used.
+  [[nodiscard]] int num_seen() const { return num_seen_; }
+  /// Of the newest update.
+  [[nodiscard]] const TrackCounts& counts() const { return update_.counts(); }
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    stamps_.serialise(a);
+    tracks_.serialise(a);
+    serialise_list(a, waiting_, static_cast<int64_t>(kMostWaiting), [&](Waiting& w) {
+      a(w.t_us, w.id);
+      serialise_picture(a, w.picture);
+    });
+    serialise_picture(a, last_);
+    a(next_pose_, pose_us_, fitness_, misfit_, trial_, num_seen_);
+  }
+
+ private:
+  static constexpr size_t kMostWaiting = 64;  ///< pictures
+
+  struct Waiting {
+    int64_t t_us = 0, id = 0;
+    TrackPicture picture;
+  };
+
+  [[nodiscard]] bool makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const;
+  void add_pose(Filter& filter, int64_t t_us);
+  void try_tracks(const State& state, bool full);
+  void judge(double dt_s);
+  void drop_oldest(State& state);
+
+  CameraTuning tuning_;
+  Camera left_;
+  std::optional<Camera> right_;
+  StampLine stamps_;
+  TrackStore tracks_;
+  TrackUpdate update_;
+  TrackWindow window_;
+  Update rows_;
+  std::deque<Waiting> waiting_;
+  TrackPicture last_;
+  int64_t next_pose_ = 1, pose_us_ = 0;
+  CameraFitness fitness_ = CameraFitness::kOnTrial;
+  double misfit_ = 0.0, trial_ = 0.0;  ///< fading mean of a track's misfit, and s of trial that spoke for the camera
+  int num_seen_ = 0;
+};
+
+}  // namespace roadfix::navigation

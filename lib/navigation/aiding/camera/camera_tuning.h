@@ -1,0 +1,43 @@
+/// Tuning of the camera's tracks as an aiding source: one set of defaults for every vehicle.
+#pragma once
+
+#include "navigation/aiding/camera/track_tuning.h"
+
+namespace roadfix::navigation {
+
+struct CameraTuning {
+  int poses = 12;               ///< of the window
+  double pose_interval = 0.07;  ///< s between two of them, at least
+  int tracks_per_update = 40;   ///< finished tracks used at one time, longest first
+  double unfit_above = 4.0;     ///< mean misfit of tracks (nis over degrees of freedom) that no good camera has
+  double fit_below = 2.5;       ///< likewise, that a good one has
+  double judged_over = 1.0;     ///< s, memory of that mean
+  double trial = 1.0;           ///< s of pictures that must fit before the camera is used, the first time
+  double trial_again = 5.0;     ///< s, after it was found unfit
+  TrackTuning tracks;
+};
+
+template <class Visitor>
+void visit(TrackTuning& c, Visitor& v) {
+  v.number("place_px", c.place_px, 0.05, 10.0);
+  v.number("refuse", c.refuse, 1.0, 1000.0);
+  v.number("nearest_m", c.nearest, 0.01, 100.0);
+  v.number("tails", c.tails, 0.5, 1e6);
+  v.integer("min_sightings", c.min_sightings, 2, 16);
+  v.number("noise_factor", c.noise_factor, 0.1, 100.0);
+}
+
+template <class Visitor>
+void visit(CameraTuning& c, Visitor& v) {
+  v.integer("poses", c.poses, 4, 16);
+  v.number("pose_interval_s", c.pose_interval, 0.0, 1.0);
+  v.integer("tracks_per_update", c.tracks_per_update, 5, 200);
+  v.number("unfit_above", c.unfit_above, 1.0, 100.0);
+  v.number("fit_below", c.fit_below, 0.5, 100.0);
+  v.number("judged_over_s", c.judged_over, 0.1, 100.0);
+  v.number("trial_s", c.trial, 0.0, 100.0);
+  v.number("trial_again_s", c.trial_again, 0.0, 1000.0);
+  v.group("tracks", c.tracks);
+}
+
+}  // namespace roadfix::navigation
