@@ -5,7 +5,10 @@
 #include <sstream>
 
 #include "config/config_error.h"
+#include "evaluation/map_formats.h"
 #include "evaluation/trajectory_formats.h"
+#include "geometry/frames.h"
+#include "pose_server/geoid.h"
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "roadfix/console.h"
@@ -20,21 +23,45 @@ struct Options {
   std::filesystem::path log;
   std::string channel = "POSE_FUSED";
   std::string format = "tum";
+  std::string geoid = "auto";
   OutputOption out;
 };
 
-void write(std::ostream& out, const PoseStream& stream, const Options& options) {
+/// Poses are above the ellipsoid unless the receiver that anchored them was above the sea.
+SeaLevelOf sea_level_of(const Calibration& calibration, const Options& options) {
+  const HeightKind kind = calibration.sensors.gnss ? calibration.sensors.gnss->height.value_or(HeightKind::kEllipsoid)
+                                                   : HeightKind::kEllipsoid;
+  if (kind == HeightKind::kMeanSeaLevel) return [](const Geodetic& g) { return SeaLevel{g.height, {}}; };
+  const std::shared_ptr<GeoidModel> geoid = GeoidModel::open(options.geoid, "");
+  if (!geoid || kind == HeightKind::kUnknown) {
+    say("export", geoid ? "no heights: what the receiver's are above is not known"
+                        : "no heights: above the sea they need a geoid, and none is installed or wanted (Debian: "
+                          "geographiclib-tools, then geographiclib-get-geoids egm96-5)");
+    return [](const Geodetic&) { return SeaLevel{}; };
+  }
+  return [geoid](const Geodetic& g) {
+    SeaLevel out;
+    out.separation_m = geoid->separation_m(g.latitude / kDegree, g.longitude / kDegree);
+    if (out.separation_m) out.height_m = g.height - *out.separation_m;
+    return out;
+  };
+}
+
+void write(std::ostream& out, const PoseStream& stream, const Options& options, const Calibration& calibration) {
   if (options.format == "tum") {
     write_tum(out, stream.trajectory);
   } else if (options.format == "kitti") {
     write_kitti(out, stream.trajectory);
   } else if (options.format == "csv") {
     write_csv(out, stream.trajectory, stream.local_frame ? std::nullopt : stream.anchor);
-  } else if (stream.anchor && !stream.local_frame) {
+  } else if (!stream.anchor || stream.local_frame) {
+    throw EvaluationLogError(options.log.string() + ": " + options.channel +
+                             " is in a frame of its own, without an ENU anchor: no " + options.format);
+  } else if (options.format == "geojson") {
     write_geojson(out, stream.trajectory, *stream.anchor, options.channel);
   } else {
-    throw EvaluationLogError(options.log.string() + ": " + options.channel +
-                             " is in a frame of its own, without an ENU anchor: no GeoJSON");
+    const auto write_map = options.format == "gpx" ? write_gpx : write_kml;
+    write_map(out, stream.trajectory, *stream.anchor, options.channel, sea_level_of(calibration, options));
   }
 }
 
@@ -55,7 +82,7 @@ void run(const Options& options) {
   for (const std::string& note : log.notes) say("export", note);
   const PoseStream& stream = poses_of(log, options.channel, options.log);
   std::ostringstream text;
-  write(text, stream, options);
+  write(text, stream, options, log.calibration);
   write_text_file(options.out.path, text.str());
   std::cout << options.out.path.string() << "\n";
 }
@@ -64,13 +91,15 @@ void run(const Options& options) {
 
 void add_export_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("export", "Write a channel's poses as TUM, KITTI, CSV or GeoJSON, or a whole log as MCAP");
+  CLI::App* command = app.add_subcommand(
+      "export", "Write a channel's poses as TUM, KITTI, CSV, GeoJSON, GPX or KML, or a whole log as MCAP");
   command->add_option("log", options->log, "a log with poses")->required()->check(CLI::ExistingFile);
   command->add_option("--channel", options->channel, "POSE_INS, POSE_FUSED, REFERENCE ...; MCAP has every channel")
       ->capture_default_str();
   command->add_option("--format", options->format)
-      ->check(CLI::IsMember({"tum", "kitti", "csv", "geojson", "mcap"}))
+      ->check(CLI::IsMember({"tum", "kitti", "csv", "geojson", "gpx", "kml", "mcap"}))
+      ->capture_default_str();
+  command->add_option("--geoid", options->geoid, "GPX, KML: auto, none, or one of GeographicLib's, egm96-5 for example")
       ->capture_default_str();
   add_output(*command, options->out, "the file to write; MCAP: - for standard output");
   command->callback([options] { run(*options); });

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from xml.etree import ElementTree
 from pathlib import Path
 
 PROGRAM = Path(sys.argv.pop(2)).resolve()
@@ -79,6 +80,19 @@ class Evaluate(unittest.TestCase):
             self.assertAlmostEqual(math.hypot(*pose[4:]), 1.0, places=9)
             self.assertAlmostEqual(float(row["lon_deg"]), point[0], places=8)
             self.assertAlmostEqual(float(row["lat_deg"]), point[1], places=8)
+
+    def test_maps_are_xml_with_every_usable_pose(self):
+        rows = list(csv.DictReader(self.export("POSE_INS", "csv").splitlines()))
+        usable = [row for row in rows if row["validity"] != "invalid"]
+        gpx = ElementTree.fromstring(self.export("POSE_INS", "gpx"))
+        points = list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkpt"))
+        self.assertEqual(len(points), len(usable))
+        for row, point in list(zip(usable, points))[::50]:
+            self.assertAlmostEqual(float(row["lat_deg"]), float(point.get("lat")), places=8)
+            self.assertAlmostEqual(float(row["lon_deg"]), float(point.get("lon")), places=8)
+        kml = ElementTree.fromstring(self.export("POSE_INS", "kml"))
+        styles = {style.text for style in kml.iter("{http://www.opengis.net/kml/2.2}styleUrl")}
+        self.assertEqual(styles, {"#valid", "#coasting"})  # the demo drive goes through a tunnel
 
     def test_what_is_wrong_is_named_and_ends_with_2(self):
         for words, said in (

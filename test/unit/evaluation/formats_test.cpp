@@ -1,6 +1,7 @@
 #include <catch2/catch.hpp>
 #include <sstream>
 
+#include "evaluation/map_formats.h"
 #include "evaluation/trajectory_formats.h"
 #include "geometry/frames.h"
 #include "unit/evaluation/synthetic.h"
@@ -87,6 +88,57 @@ TEST_CASE("GeoJSON gives longitude before latitude, back to a millimetre") {
   numbers >> longitude >> comma >> latitude >> comma >> height;
   const Eigen::Vector3d p = EnuAnchor(kAnchor).enu({latitude * kDegree, longitude * kDegree, height});
   CHECK((p - trajectory.poses.front().T_frame_vehicle.p).norm() < 1e-3);
+}
+
+int count(const std::string& text, const std::string& word) {
+  int n = 0;
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++n;
+  return n;
+}
+
+/// The first number in `text` after `key`.
+double number_behind(const std::string& text, const std::string& key) {
+  return std::stod(text.substr(text.find(key) + key.size()));
+}
+
+TEST_CASE("GPX: a segment for each stretch with a position, and heights only above the sea") {
+  Trajectory trajectory = sample();
+  trajectory.poses.back().validity = Validity::kCoasting;
+  const auto poses = static_cast<int>(trajectory.poses.size());
+  std::stringstream known, unknown;
+  write_gpx(known, trajectory, kAnchor, "A<&>", [](const Geodetic& g) { return SeaLevel{g.height - 46.0, 46.0}; });
+  write_gpx(unknown, trajectory, kAnchor, "A<&>", [](const Geodetic&) { return SeaLevel{}; });
+  const Geodetic place = EnuAnchor(kAnchor).geodetic(trajectory.poses.front().T_frame_vehicle.p);
+  for (const std::string& text : {known.str(), unknown.str()}) {
+    CHECK(count(text, "<trkseg>") == 2);  // an invalid pose lies between
+    CHECK(count(text, "</trkseg>") == 2);
+    CHECK(count(text, "<trkpt ") == poses - 1);
+    CHECK(count(text, "<fix>none</fix>") == 1);
+    CHECK(count(text, "<name>A&lt;&amp;&gt;</name>") == 1);
+    CHECK(count(text, "<time>2025-07-08T19:34:18.499123Z</time>") == 1);
+    CHECK(number_behind(text, "lat=\"") == Approx(place.latitude / kDegree).margin(1e-9));
+    CHECK(number_behind(text, "lon=\"") == Approx(place.longitude / kDegree).margin(1e-9));
+  }
+  CHECK(number_behind(known.str(), "<ele>") == Approx(place.height - 46.0).margin(1e-3));
+  CHECK(count(known.str(), "<geoidheight>46.000</geoidheight>") == poses - 1);
+  CHECK(count(unknown.str(), "<ele>") == 0);
+}
+
+TEST_CASE("KML: a line for each stretch of one validity, on the ground where heights are unknown") {
+  Trajectory trajectory = sample();
+  for (std::size_t i = 6; i < 8; ++i) trajectory.poses[i].validity = Validity::kCoasting;
+  std::stringstream known, unknown;
+  write_kml(known, trajectory, kAnchor, "POSE", [](const Geodetic& g) { return SeaLevel{g.height, {}}; });
+  write_kml(unknown, trajectory, kAnchor, "POSE", [](const Geodetic&) { return SeaLevel{}; });
+  CHECK(count(known.str(), "<LineString>") == 4);  // valid, invalid, valid, coasting, valid
+  CHECK(count(known.str(), "#coasting") == 1);
+  CHECK(count(known.str(), "absolute") == 4);
+  CHECK(count(unknown.str(), "clampToGround") == 4);
+  const std::string text = unknown.str();
+  const std::string first =
+      text.substr(text.find("<coordinates>\n") + 14,
+                  text.find('\n', text.find("<coordinates>\n") + 14) - text.find("<coordinates>\n") - 14);
+  CHECK(std::count(first.begin(), first.end(), ',') == 1);
 }
 
 TEST_CASE("ISO times") {
