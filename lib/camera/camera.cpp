@@ -5,11 +5,12 @@
 namespace roadfix {
 namespace {
 
-constexpr double kMinDepth = 1e-6;       ///< m; nearer points, and those behind, have no pixel
-constexpr double kMaxRadius = 11.43;     ///< tan(85 deg): beyond it normalised coordinates lose their meaning
-constexpr double kRadiusStep = 0.01;     ///< of the search for the fold; the range ends this much before it
-constexpr int kNewtonSteps = 20;         ///< quadratic convergence: 5 suffice for an ordinary lens
-constexpr double kNewtonEnough = 1e-14;  ///< normalised; rounding of one pixel coordinate
+constexpr double kMinDepth = 1e-6;          ///< m; nearer points, and those behind, have no pixel
+constexpr double kMaxRadius = 11.43;        ///< tan(85 deg): validity limit of normalised coordinates
+constexpr double kRadiusStep = 0.01;        ///< of the search for the first non-monotonic radius; the valid range ends
+                                            ///< this much before it
+constexpr int kNewtonSteps = 20;            ///< quadratic convergence: 5 suffice for an ordinary lens
+constexpr double kNewtonTolerance = 1e-14;  ///< normalised; rounding error of a pixel coordinate
 
 struct Distorted {
   Eigen::Vector2d xy;
@@ -55,8 +56,8 @@ Distorted distort_normalised(const CameraIntrinsics& k, const Eigen::Vector2d& n
   return {n, Eigen::Matrix2d::Identity()};
 }
 
-/// First radius at which the distorted radius stops growing. Tangential terms are left out: they are a hundred times
-/// smaller.
+/// First radius at which the distorted radius is no longer monotonic. Tangential terms are a hundred times smaller and
+/// neglected.
 double fold_radius(CameraIntrinsics k) {
   if (k.distortion == Distortion::kNone) return kMaxRadius;
   if (k.distortion == Distortion::kRadTan) k.coefficients[2] = k.coefficients[3] = 0.0;
@@ -104,7 +105,7 @@ std::optional<Eigen::Vector2d> Camera::unproject(const Eigen::Vector2d& pixel) c
     if (!step.allFinite()) return std::nullopt;
     n += step;
     if (n.norm() > max_radius_) n *= max_radius_ / n.norm();
-    if (step.norm() < kNewtonEnough) break;
+    if (step.norm() < kNewtonTolerance) break;
   }
   const double error = (distort_normalised(intrinsics_, n).xy - target).norm();
   if (!(error < 1e-9)) return std::nullopt;

@@ -1,9 +1,9 @@
 /// A camera's projection: pinhole, with radial-tangential (Brown-Conrady, OpenCV's k1 k2 p1 p2 k3) or equidistant
 /// (Kannala and Brandt 2006, OpenCV's fisheye k1 k2 k3 k4) distortion.
 ///
-/// Two kinds of image coordinates: a *pixel* is what the picture has (u to the right, v down, the centre of the first
-/// pixel at 0 0); *normalised* coordinates are (x/z, y/z) of a point in camera axes, free of distortion. Estimators
-/// work on normalised coordinates, so that distortion is paid once per feature.
+/// Two kinds of image coordinates: a *pixel* is a raw image coordinate (u to the right, v down, the centre of the first
+/// pixel at 0 0); *normalised* coordinates are (x/z, y/z) of a point in camera axes, without distortion. Estimators use
+/// normalised coordinates: undistortion is computed once per feature.
 #pragma once
 
 #include <Eigen/Dense>
@@ -31,28 +31,28 @@ class Camera {
  public:
   explicit Camera(const CameraIntrinsics& intrinsics);
 
-  /// Pixel of a point in camera axes and, where asked for, its derivative by the point. Nothing for a point that is not
-  /// in front of the camera or that lies beyond the radius where the distortion polynomial folds back.
+  /// Pixel of a point in camera axes and, optionally, its Jacobian by the point. No value for a point that is not in
+  /// front of the camera or beyond the radius where the distortion polynomial is no longer monotonic.
   [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_camera,
                                                        Matrix23d* J_point = nullptr) const;
 
-  /// Normalised coordinates of a pixel; nothing where no point of the valid range has this pixel.
+  /// Normalised coordinates of a pixel; no value outside the valid range of the distortion model.
   [[nodiscard]] std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
 
-  /// Pixel of normalised coordinates and, where asked for, its derivative by them.
+  /// Pixel of normalised coordinates and, optionally, its Jacobian.
   [[nodiscard]] std::optional<Eigen::Vector2d> distort(const Eigen::Vector2d& normalised,
                                                        Eigen::Matrix2d* J_normalised = nullptr) const;
 
-  /// Inside the picture, at least `border` pixels from its edge.
+  /// Inside the image, at least `border` pixels from its edge.
   [[nodiscard]] bool sees(const Eigen::Vector2d& pixel, double border = 0.0) const;
 
-  /// Pixels per unit of normalised coordinates at the centre: what turns a residual there into pixels.
+  /// Pixels per unit of normalised coordinates at the centre: converts residuals to pixels.
   [[nodiscard]] double focal() const { return 0.5 * (intrinsics_.fx + intrinsics_.fy); }
   [[nodiscard]] const CameraIntrinsics& intrinsics() const { return intrinsics_; }
 
  private:
   CameraIntrinsics intrinsics_;
-  double max_radius_ = 0.0;  ///< of normalised coordinates, beyond which the model is not valid
+  double max_radius_ = 0.0;  ///< normalised, end of the valid range of the distortion model
 };
 
 }  // namespace roadfix

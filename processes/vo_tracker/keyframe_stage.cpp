@@ -124,7 +124,7 @@ void KeyframeStage::load(std::span<const uint8_t> state) {
       std::make_unique<KeyframeTracker>(config_.keyframe, camera_rig(calibration_),
                                         make_front_end(config_.keyframe.front_end, superpoint_weights_), *executor_);
   StateReader reader(state);
-  StampFilter stamps = stamps_;
+  TimestampFilter stamps = stamps_;
   stamps.load(reader);
   loaded->load(reader);
   reader.finish();

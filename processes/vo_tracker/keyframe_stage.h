@@ -7,7 +7,7 @@
 #pragma once
 
 #include "bus/stage.h"
-#include "camera/stamp_filter.h"
+#include "camera/timestamp_filter.h"
 #include "stream/executor.h"
 #include "vo_tracker/handler.h"
 
@@ -47,7 +47,7 @@ class KeyframeStage final : public Stage {
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<KeyframeTracker> tracker_;
   std::unique_ptr<CameraFrame> left_;  ///< waits for its right picture until the tick's end
-  StampFilter stamps_;
+  TimestampFilter stamps_;
   bool tracked_ = false;    ///< a frame since the last publish
   bool map_began_ = false;  ///< with the frame of the last publish
 };

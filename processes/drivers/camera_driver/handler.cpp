@@ -72,7 +72,7 @@ CameraDriver::CameraDriver(const CameraDriverConfig& config) : config_(config) {
 
 void CameraDriver::opened(int stream) {
   const auto i = static_cast<std::size_t>(stream);
-  const StampFilter fresh(config_.rate > 0.0 ? std::optional<double>(config_.rate) : std::nullopt);
+  const TimestampFilter fresh(config_.rate > 0.0 ? std::optional<double>(config_.rate) : std::nullopt);
   if (i < stamps_.size())
     stamps_[i] = fresh;
   else

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "camera/stamp_filter.h"
+#include "camera/timestamp_filter.h"
 #include "drivers/device/driver.h"
 
 namespace roadfix {
@@ -66,7 +66,7 @@ class CameraDriver : public SensorDriver {
 
  private:
   CameraDriverConfig config_;
-  std::vector<StampFilter> stamps_;
+  std::vector<TimestampFilter> stamps_;
   std::vector<StreamCounters> counters_;
 };
 

@@ -29,7 +29,7 @@ std::vector<Eigen::Vector3d> points_in_view(int count) {
   return points;
 }
 
-/// Largest relative difference between the analytic and the numerical derivative of project() by the point.
+/// Largest relative difference between the analytic and the numerical Jacobian of project().
 double jacobian_error(const Camera& camera, double spoil = 0.0) {
   double worst = 0.0;
   for (const Eigen::Vector3d& p : points_in_view(20)) {
@@ -43,7 +43,7 @@ double jacobian_error(const Camera& camera, double spoil = 0.0) {
   return worst;
 }
 
-TEST_CASE("unproject undoes project for every model") {
+TEST_CASE("unproject inverts project for every model") {
   for (const CameraIntrinsics& k : {pinhole(), radtan(), equidistant()}) {
     const Camera camera(k);
     for (const Eigen::Vector3d& p : points_in_view(200)) {
@@ -56,14 +56,14 @@ TEST_CASE("unproject undoes project for every model") {
   }
 }
 
-TEST_CASE("the projection's derivative is the numerical one") {
+TEST_CASE("the Jacobian of the projection equals the numerical one") {
   for (const CameraIntrinsics& k : {pinhole(), radtan(), equidistant()}) {
     CHECK(jacobian_error(Camera(k)) < 1e-6);
     CHECK(jacobian_error(Camera(k), 1e-4) > 1e-5);  // teeth
   }
 }
 
-TEST_CASE("distortion matches hand-computed values") {
+TEST_CASE("distortion equals hand-computed values") {
   // r2 = 0.13, radial = 1 + 0.13 * (-0.2834 + 0.13 * (0.0739 - 0.13 * 0.01)) = 0.96438494
   const auto pixel = Camera(radtan()).project({0.3, -0.2, 1.0});
   REQUIRE(pixel);
@@ -72,19 +72,19 @@ TEST_CASE("distortion matches hand-computed values") {
         Approx(248.375 + 457.296 * (-0.2 * 0.96438494 + 1.9e-4 * 0.21 - 2 * 1.8e-5 * 0.06)).epsilon(1e-9));
 }
 
-TEST_CASE("a point behind the camera or beyond the fold has no pixel") {
+TEST_CASE("a point behind the camera or beyond the valid radius has no pixel") {
   const Camera camera(radtan());
   CHECK_FALSE(camera.project({0.0, 0.0, -1.0}));
   CHECK_FALSE(camera.project({0.0, 0.0, 0.0}));
   CHECK_FALSE(camera.project({std::nan(""), 0.0, 1.0}));
   CameraIntrinsics strong = radtan();
-  strong.coefficients = {-0.4, 0.0, 0.0, 0.0, 0.0};  // folds at r = sqrt(1 / 1.2) = 0.913
+  strong.coefficients = {-0.4, 0.0, 0.0, 0.0, 0.0};  // not monotonic from r = sqrt(1 / 1.2) = 0.913
   CHECK(Camera(strong).project({0.89, 0.0, 1.0}));
   CHECK_FALSE(Camera(strong).project({0.93, 0.0, 1.0}));
   CHECK_FALSE(Camera(strong).unproject({2000.0, 248.0}));
 }
 
-TEST_CASE("a picture sees its own pixels only") {
+TEST_CASE("only pixels inside the image are visible") {
   const Camera camera(pinhole());
   CHECK(camera.sees({0.0, 0.0}));
   CHECK(camera.sees({1240.0, 375.0}));

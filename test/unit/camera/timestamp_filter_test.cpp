@@ -1,4 +1,4 @@
-#include "camera/stamp_filter.h"
+#include "camera/timestamp_filter.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -10,7 +10,7 @@ namespace {
 
 struct Run {
   double raw_rms_s = 0.0,
-         rms_s = 0.0;  ///< against the true times, a constant offset taken out, after the first 50 frames
+         rms_s = 0.0;  ///< RMS against the true times, constant offset removed, after the first 50 frames
   bool ascending = true;
 };
 
@@ -18,7 +18,7 @@ struct Run {
 Run run(std::optional<double> told_hz, double rate_hz, double jitter_s, int frames = 600) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> late(0.0, jitter_s);
-  StampFilter filter(told_hz);
+  TimestampFilter filter(told_hz);
   std::vector<double> raw, filtered;
   int64_t last = 0;
   Run result;
@@ -44,7 +44,7 @@ Run run(std::optional<double> told_hz, double rate_hz, double jitter_s, int fram
   return result;
 }
 
-TEST_CASE("jitter is taken out, with the rate told, told wrongly by half a percent, or not told") {
+TEST_CASE("jitter is removed with the rate given, given wrong by 0.5 %, or not given") {
   for (const std::optional<double> told :
        {std::optional<double>(10.0), std::optional<double>(10.05), std::optional<double>()}) {
     const Run r = run(told, 10.0, 0.05);
@@ -54,13 +54,13 @@ TEST_CASE("jitter is taken out, with the rate told, told wrongly by half a perce
   }
 }
 
-TEST_CASE("stamps without jitter stay as they are") {
+TEST_CASE("stamps without jitter are unchanged") {
   CHECK(run(10.0, 10.0, 0.0).rms_s < 1e-6);
   CHECK(run({}, 9.65, 0.0).rms_s < 1e-6);
 }
 
-TEST_CASE("after a pause off the beat a new line begins") {
-  StampFilter filter(10.0);
+TEST_CASE("the line restarts after a pause of a fractional number of periods") {
+  TimestampFilter filter(10.0);
   int64_t t = 0, last = 0;
   for (int i = 0; i < 50; ++i) last = filter.filter(t += 100'000);
   t += 3'350'000;
@@ -72,8 +72,8 @@ TEST_CASE("after a pause off the beat a new line begins") {
   CHECK(std::abs(static_cast<double>(last - t)) < 60'000.0);
 }
 
-TEST_CASE("a saved filter goes on with the same times") {
-  StampFilter one(10.0), two(10.0);
+TEST_CASE("a restored filter continues with the same times") {
+  TimestampFilter one(10.0), two(10.0);
   for (int i = 1; i < 20; ++i) (void)one.filter(100'000 * i + 7'000 * (i % 3));
   StateWriter writer;
   one.save(writer);
