@@ -7,7 +7,7 @@
 namespace roadfix {
 namespace {
 
-/// Which places of the picture are too near to an accepted point: bins of half the distance's size, exact test inside.
+/// Positions too close to an accepted point: spatial bins, exact test inside.
 class Occupancy {
  public:
   Occupancy(const cv::Mat& gray, double min_distance_px)
@@ -47,7 +47,7 @@ class Occupancy {
   std::vector<std::vector<Eigen::Vector2f>> bins_;
 };
 
-/// Smaller eigenvalue of the mean gradient matrix over 7 x 7 pixels; sums are integers, so that they are exact.
+/// Smaller eigenvalue of the mean gradient matrix over 7 x 7 pixels; sums are integers and exact.
 float corner_score(const cv::Mat& gray, int u, int v) {
   constexpr int kHalf = 3;
   int xx = 0, xy = 0, yy = 0;  // 49 squares of 255 at most
@@ -69,22 +69,21 @@ float corner_score(const cv::Mat& gray, int u, int v) {
   return static_cast<float>(kScale * (trace - root));
 }
 
-constexpr double kNearer = 0.7;  ///< of the distance at which as many as are wanted would stand on a grid
+constexpr double kSpacingFactor = 0.7;  ///< of the spacing of max_corners on a regular grid
 
 }  // namespace
 
 std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> taken,
                                    const CornerConfig& config) {
-  constexpr int kScoreReach = 4;  // of corner_score's window and gradient
-  const int border = std::max(config.border_px, kScoreReach);
+  constexpr int kScoreMargin = 4;  // window and gradient of corner_score
+  const int border = std::max(config.border_px, kScoreMargin);
   std::vector<Corner> accepted;
   if (config.max_corners <= 0 || gray.cols <= 2 * border || gray.rows <= 2 * border) return accepted;
-  // A grid whose cells would hold about one corner each when all are found. Where a small picture has no room for so
-  // many at their distance, they stand closer: sky and road have none, and corners that keep a distance fill half of
-  // the room that it leaves them.
+  // Grid cells for about one corner each. In a small image the minimum distance is reduced: sky and road have no
+  // corners, and corners with a minimum distance fill only half of the remaining area.
   const auto expected = static_cast<double>(taken.size()) + static_cast<double>(config.max_corners);
-  const double room_px = std::sqrt(static_cast<double>(gray.total()) / expected);
-  const double distance_px = std::min(config.min_distance_px, kNearer * room_px);
+  const double cell_px = std::sqrt(static_cast<double>(gray.total()) / expected);
+  const double distance_px = std::min(config.min_distance_px, kSpacingFactor * cell_px);
   Occupancy occupancy(gray, distance_px);
   for (const Eigen::Vector2f& pixel : taken) occupancy.add(pixel);
 
@@ -95,8 +94,8 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
   };
   if (!std::is_sorted(found.begin(), found.end(), before)) std::sort(found.begin(), found.end(), before);
 
-  const int columns = static_cast<int>(gray.cols / room_px) + 1;
-  const int rows = static_cast<int>(gray.rows / room_px) + 1;
+  const int columns = static_cast<int>(gray.cols / cell_px) + 1;
+  const int rows = static_cast<int>(gray.rows / cell_px) + 1;
   std::vector<std::vector<Corner>> cells(static_cast<size_t>(columns) * static_cast<size_t>(rows));
   for (const cv::KeyPoint& key : found) {
     const int u = static_cast<int>(key.pt.x), v = static_cast<int>(key.pt.y);
@@ -104,14 +103,14 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
     const Eigen::Vector2f pixel(key.pt.x, key.pt.y);
     if (!occupancy.free(pixel)) continue;
     const auto cell =
-        static_cast<size_t>(v / room_px) * static_cast<size_t>(columns) + static_cast<size_t>(u / room_px);
+        static_cast<size_t>(v / cell_px) * static_cast<size_t>(columns) + static_cast<size_t>(u / cell_px);
     cells[cell].push_back({pixel, corner_score(gray, u, v)});
   }
   for (std::vector<Corner>& cell : cells) {
     std::stable_sort(cell.begin(), cell.end(), [](const Corner& a, const Corner& b) { return a.score > b.score; });
   }
 
-  // Rounds: every cell's next best corner, the best of the round first.
+  // Rounds: the next best corner of every cell, best first.
   std::vector<size_t> next(cells.size(), 0);
   const auto quota = static_cast<size_t>(config.max_corners);
   for (bool any = true; any && accepted.size() < quota;) {

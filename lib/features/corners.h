@@ -1,5 +1,5 @@
-/// Corners spread over the whole picture: FAST finds candidates, the smaller eigenvalue of the gradient matrix ranks
-/// them (Shi and Tomasi, 1994), and no two stand closer than a distance.
+/// Corners distributed over the whole image: FAST proposes candidates, the smaller eigenvalue of the gradient matrix
+/// ranks them (Shi and Tomasi, 1994), with a minimum distance between corners.
 #pragma once
 
 #include <Eigen/Dense>
@@ -16,13 +16,13 @@ struct Corner {
 
 struct CornerConfig {
   int max_corners = 300;
-  double min_distance_px = 16.0;  ///< less where the picture has no room for max_corners so far apart
+  double min_distance_px = 16.0;  ///< reduced where the image is too small for max_corners at this distance
   int fast_threshold = 8;
-  int border_px = 12;  ///< kept free at the edge of the picture
+  int border_px = 12;  ///< margin at the edge of the image
 };
 
-/// The best corners away from `taken`, best first within each round: each round gives every cell of a grid one corner,
-/// so that a rich corner of the picture cannot use up the quota. Ties go to the smaller row, then column.
+/// The best corners away from `taken`. Each round selects one corner per grid cell, best first, so that a textured
+/// region cannot use up the quota. Ties: smaller row, then column.
 std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> taken,
                                    const CornerConfig& config);
 

@@ -9,9 +9,9 @@
 namespace roadfix {
 namespace {
 
-constexpr int kMaxMissed = 2;  ///< pictures that a track may go unseen: detectors blink
+constexpr int kMaxMissed = 2;  ///< images without detection before a track ends
 
-/// Keypoints by place: bins as wide as the search radius.
+/// Spatial bins over keypoints, as wide as the search radius.
 class Bins {
  public:
   Bins(const std::vector<Eigen::Vector2f>& pixels, double radius) : pixels_(pixels), bin_(static_cast<float>(radius)) {
@@ -46,20 +46,21 @@ struct Match {
 
 }  // namespace
 
-std::vector<Feature> DescriptorTracks::track(const cv::Mat& gray, std::span<const Feature> hints) {
+std::vector<Feature> DescriptorTracks::track(const cv::Mat& gray, std::span<const Feature> predictions) {
   keypoints_ = detector_->detect(gray);
   used_.assign(keypoints_.pixels.size(), false);
-  num_expected_ =
-      static_cast<int>(std::count_if(live_.begin(), live_.end(), [](const Track& track) { return track.missed == 0; }));
+  num_expected_ = static_cast<int>(
+      std::count_if(tracks_.begin(), tracks_.end(), [](const Track& track) { return track.missed == 0; }));
   const Bins bins(keypoints_.pixels, config_.match_radius_px);
   const double same_place2 = 0.25 * config_.min_distance_px * config_.min_distance_px;
-  std::vector<std::optional<Match>> best(live_.size());
-  std::vector<size_t> owner(keypoints_.pixels.size(), live_.size());
-  auto hint = hints.begin();
-  for (size_t t = 0; t < live_.size(); ++t) {
-    const Track& track = live_[t];
-    while (hint != hints.end() && hint->track < track.feature.track) ++hint;
-    const bool hinted = hint != hints.end() && hint->track == track.feature.track && hint->pixel.allFinite();
+  std::vector<std::optional<Match>> best(tracks_.size());
+  std::vector<size_t> owner(keypoints_.pixels.size(), tracks_.size());
+  auto prediction = predictions.begin();
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    const Track& track = tracks_[t];
+    while (prediction != predictions.end() && prediction->track < track.feature.track) ++prediction;
+    const bool has_prediction =
+        prediction != predictions.end() && prediction->track == track.feature.track && prediction->pixel.allFinite();
     std::optional<Match> first;
     double second = std::numeric_limits<double>::infinity();
     const auto consider = [&](size_t i) {
@@ -75,19 +76,19 @@ std::vector<Feature> DescriptorTracks::track(const cv::Mat& gray, std::span<cons
       }
       first = Match{i, distance};
     };
-    bins.visit_near(hinted ? hint->pixel : track.feature.pixel, consider);
+    bins.visit_near(has_prediction ? prediction->pixel : track.feature.pixel, consider);
     if (!first || first->distance > detector_->max_distance() || first->distance > config_.match_ratio * second) {
       continue;
     }
-    size_t& owned_by = owner[first->keypoint];  // one keypoint, one track: the better one
-    if (owned_by < live_.size() && best[owned_by]->distance <= first->distance) continue;
-    if (owned_by < live_.size()) best[owned_by].reset();
+    size_t& owned_by = owner[first->keypoint];  // each keypoint belongs to one track: the better match
+    if (owned_by < tracks_.size() && best[owned_by]->distance <= first->distance) continue;
+    if (owned_by < tracks_.size()) best[owned_by].reset();
     owned_by = t;
     best[t] = first;
   }
   std::vector<Feature> found;
-  for (size_t t = 0; t < live_.size(); ++t) {
-    Track& track = live_[t];
+  for (size_t t = 0; t < tracks_.size(); ++t) {
+    Track& track = tracks_[t];
     ++track.missed;
     if (!best[t]) continue;
     track.missed = 0;
@@ -96,7 +97,7 @@ std::vector<Feature> DescriptorTracks::track(const cv::Mat& gray, std::span<cons
     used_[best[t]->keypoint] = true;
     found.push_back(track.feature);
   }
-  std::erase_if(live_, [](const Track& track) { return track.missed > kMaxMissed; });
+  std::erase_if(tracks_, [](const Track& track) { return track.missed > kMaxMissed; });
   return found;
 }
 
@@ -106,7 +107,7 @@ std::vector<Feature> DescriptorTracks::replenish() {
   std::stable_sort(order.begin(), order.end(),
                    [this](size_t a, size_t b) { return keypoints_.scores[a] > keypoints_.scores[b]; });
   std::vector<Eigen::Vector2f> taken;
-  for (const Track& track : live_) {
+  for (const Track& track : tracks_) {
     if (track.missed == 0) taken.push_back(track.feature.pixel);
   }
   const auto min_distance2 = static_cast<float>(config_.min_distance_px * config_.min_distance_px);
@@ -121,18 +122,19 @@ std::vector<Feature> DescriptorTracks::replenish() {
     taken.push_back(pixel);
     used_[i] = true;
     fresh.push_back({next_track_++, pixel});
-    live_.push_back({fresh.back(), keypoints_.descriptors.row(static_cast<int>(i)).clone(), 0});
+    tracks_.push_back({fresh.back(), keypoints_.descriptors.row(static_cast<int>(i)).clone(), 0});
   }
   return fresh;
 }
 
 void DescriptorTracks::drop(std::span<const int64_t> tracks) {
-  std::erase_if(
-      live_, [&](const Track& track) { return std::binary_search(tracks.begin(), tracks.end(), track.feature.track); });
+  std::erase_if(tracks_, [&](const Track& track) {
+    return std::binary_search(tracks.begin(), tracks.end(), track.feature.track);
+  });
 }
 
 void DescriptorTracks::reset() {
-  live_.clear();
+  tracks_.clear();
   keypoints_ = {};
   used_.clear();
 }
@@ -140,8 +142,8 @@ void DescriptorTracks::reset() {
 void DescriptorTracks::save(StateWriter& writer) const {
   writer.put(next_track_);
   writer.put(num_expected_);
-  writer.put(static_cast<int64_t>(live_.size()));
-  for (const Track& track : live_) {
+  writer.put(static_cast<int64_t>(tracks_.size()));
+  for (const Track& track : tracks_) {
     writer.put(track.feature.track);
     writer.put(track.feature.pixel);
     writer.put(track.missed);
@@ -155,7 +157,7 @@ void DescriptorTracks::load(StateReader& reader) {
   reader.get(next_track_);
   reader.get(num_expected_);
   for (auto left = reader.get<int64_t>(); left > 0; --left) {
-    Track& track = live_.emplace_back();
+    Track& track = tracks_.emplace_back();
     reader.get(track.feature.track);
     reader.get(track.feature.pixel);
     reader.get(track.missed);

@@ -1,4 +1,4 @@
-/// Descriptor front end: keypoints of each picture matched to the tracks near where these are expected.
+/// Descriptor front end: keypoints of each image are matched to tracks near their predicted positions.
 #pragma once
 
 #include "features/keypoints.h"
@@ -10,7 +10,7 @@ class DescriptorTracks final : public FrontEnd {
   DescriptorTracks(const FrontEndConfig& config, std::unique_ptr<KeypointDetector> detector)
       : config_(config), detector_(std::move(detector)) {}
 
-  std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> hints) override;
+  std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> predictions) override;
   std::vector<Feature> replenish() override;
   void drop(std::span<const int64_t> tracks) override;
   void reset() override;
@@ -20,18 +20,18 @@ class DescriptorTracks final : public FrontEnd {
 
  private:
   struct Track {
-    Feature feature;     ///< where it was seen last
-    cv::Mat descriptor;  ///< one row, as seen last
-    int missed = 0;      ///< pictures since
+    Feature feature;     ///< at the last detection
+    cv::Mat descriptor;  ///< one row, at the last detection
+    int missed = 0;      ///< images since the last detection
   };
 
   FrontEndConfig config_;
   std::unique_ptr<KeypointDetector> detector_;
   int64_t next_track_ = 1;
   int num_expected_ = 0;
-  std::vector<Track> live_;  ///< ascending by track
-  Keypoints keypoints_;      ///< of the last picture
-  std::vector<bool> used_;   ///< keypoints that belong to a track
+  std::vector<Track> tracks_;  ///< ascending by track
+  Keypoints keypoints_;        ///< of the last image
+  std::vector<bool> used_;     ///< keypoints assigned to a track
 };
 
 }  // namespace roadfix

@@ -1,4 +1,4 @@
-/// From coarse to fine: where a point of one picture lies in another, near enough for patch.h to finish.
+/// Coarse-to-fine optical flow: the approximate position of a point in a second image, for refinement by patch.h.
 #pragma once
 
 #include <Eigen/Dense>
@@ -8,21 +8,20 @@
 
 namespace roadfix {
 
-/// A picture and its copies, each half the size of the one before.
+/// An image pyramid, each level half the size of the one below.
 struct FlowPyramid {
   std::vector<cv::Mat> levels;
 
   [[nodiscard]] bool empty() const { return levels.empty(); }
-  [[nodiscard]] const cv::Mat& picture(size_t level = 0) const { return levels[level]; }
+  [[nodiscard]] const cv::Mat& image(size_t level = 0) const { return levels[level]; }
 };
 
-/// `levels`: above the picture itself. `spare`: an old one whose memory is used again; a picture of this size would get
-/// fresh pages each time.
-FlowPyramid flow_pyramid(const cv::Mat& gray, int levels, FlowPyramid spare = {});
+/// `levels`: above the full image. `reuse`: an old pyramid whose memory is reused.
+FlowPyramid flow_pyramid(const cv::Mat& gray, int levels, FlowPyramid reuse = {});
 
-/// Follows `from` in the first picture to the second, beginning at `to`, on every level but the picture itself, which
-/// is left to the caller. A level that does not find the point leaves the place that it was given.
-Eigen::Vector2f approach(const FlowPyramid& first, const FlowPyramid& second, const Eigen::Vector2f& from,
-                         const Eigen::Vector2f& to, int window_px);
+/// Tracks `from` in the first image to the second, starting at `to`, on all levels above the full image, which is left
+/// to the caller. A level where the patch is not found passes its input position on.
+Eigen::Vector2f coarse_to_fine_flow(const FlowPyramid& first, const FlowPyramid& second, const Eigen::Vector2f& from,
+                                    const Eigen::Vector2f& to, int window_px);
 
 }  // namespace roadfix

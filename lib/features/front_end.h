@@ -1,7 +1,7 @@
-/// What every front end does: follow image points from picture to picture, each under a number of its own.
+/// Interface of all front ends: track image points from image to image under unique track numbers.
 ///
-/// An estimator sees only tracks, so that optical flow and descriptor matching are interchangeable. Same pictures,
-/// hints and calls give the same tracks, bit for bit (DESIGN.md, section 5, says on which machines).
+/// Estimators see only tracks, so that optical flow and descriptor matching are interchangeable. The same images,
+/// predictions and calls give the same tracks, bit for bit (DESIGN.md, section 5, names the machines).
 #pragma once
 
 #include <Eigen/Dense>
@@ -15,30 +15,30 @@
 
 namespace roadfix {
 
-/// One track in one picture.
+/// One observation of a track.
 struct Feature {
-  int64_t track = 0;      ///< its number; never given twice by one front end
-  Eigen::Vector2f pixel;  ///< of the picture as it came, distorted
+  int64_t track = 0;      ///< unique within one front end
+  Eigen::Vector2f pixel;  ///< raw (distorted) image coordinates
 };
 
 enum class FrontEndKind { kKlt, kOrb, kSift, kSuperPoint };
 
 struct FrontEndConfig {
   FrontEndKind kind = FrontEndKind::kKlt;
-  int max_features = 350;         ///< tracks kept alive at a time
-  double min_distance_px = 16.0;  ///< between two tracks when the second begins; less in a small picture
-  int fast_threshold = 8;         ///< grey levels by which a corner's ring differs from its centre
+  int max_features = 350;         ///< maximum number of active tracks
+  double min_distance_px = 16.0;  ///< between tracks at their start; reduced in a small image
+  int fast_threshold = 8;         ///< grey levels, intensity difference of FAST
   // Optical flow.
   int klt_window_px = 11;            ///< odd
-  int klt_levels = 3;                ///< pyramid levels above the picture itself
-  double klt_min_correlation = 0.8;  ///< of a patch with what it was when it was taken
-  double klt_shape_std = 0.1;        ///< change of a patch's shape from picture to picture; zero: patches keep theirs
+  int klt_levels = 3;                ///< pyramid levels above the full image
+  double klt_min_correlation = 0.8;  ///< with the template patch
+  double klt_shape_std = 0.1;        ///< prior sigma of the affine shape between images; zero: translation only
   // Descriptors.
   int orb_levels = 6;                   ///< pyramid levels, each 1.2 times smaller
-  double match_radius_px = 60.0;        ///< around the place where a track is expected
-  double match_ratio = 0.85;            ///< best distance over second best, at most
-  double superpoint_min_score = 0.015;  ///< probability of a corner
-  double superpoint_scale = 0.5;        ///< the picture is shrunk by this before the network sees it
+  double match_radius_px = 60.0;        ///< around the predicted position
+  double match_ratio = 0.85;            ///< ratio test: best over second best distance, upper limit
+  double superpoint_min_score = 0.015;  ///< corner probability
+  double superpoint_scale = 0.5;        ///< image scale of the network's input
 };
 
 template <class Visitor>
@@ -70,24 +70,24 @@ class FrontEnd {
   FrontEnd& operator=(const FrontEnd&) = delete;
   virtual ~FrontEnd() = default;
 
-  /// Finds the live tracks in the next picture (8-bit grey) and returns those found, in ascending order of track. A
-  /// hint says where a track is expected; without one it is looked for where it was. Tracks not found end.
-  virtual std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> hints) = 0;
+  /// Finds the active tracks in the next image (8-bit grey) and returns those found, in ascending order of track.
+  /// Tracks without a prediction are searched at their last position. Tracks not found end.
+  virtual std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> predictions) = 0;
 
-  /// Begins new tracks in the picture of the last track(), where there is room; returns the new ones.
+  /// Starts new tracks in the image of the last track() where there is room; returns the new ones.
   virtual std::vector<Feature> replenish() = 0;
 
-  /// Ends these tracks (ascending), which the estimator found to be wrong.
+  /// Ends these tracks (ascending): rejected by the estimator.
   virtual void drop(std::span<const int64_t> tracks) = 0;
 
-  /// Forgets pictures and tracks; numbers go on.
+  /// Clears images and tracks; track numbers continue.
   virtual void reset() = 0;
 
-  /// Everything that later tracks depend on, the last picture included.
+  /// Serialises everything that later tracks depend on, the last image included.
   virtual void save(StateWriter& writer) const = 0;
   virtual void load(StateReader& reader) = 0;
 
-  /// Tracks that were looked for in the last picture: what the share of matches is of.
+  /// Number of tracks searched in the last image: the denominator of the match ratio.
   [[nodiscard]] virtual int num_expected() const = 0;
 };
 
@@ -96,7 +96,7 @@ class FrontEnd {
 std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config,
                                          std::span<const uint8_t> superpoint_weights = {});
 
-/// Turns OpenCV's own threads off: their number must not change results. Every main() that sees pictures calls it.
+/// Disables OpenCV's threads, whose number must not change results. Every main() that processes images calls it.
 void fix_opencv_threads();
 
 }  // namespace roadfix

@@ -1,4 +1,4 @@
-/// Keypoints with descriptors of one picture: what the descriptor front ends match.
+/// Keypoints with descriptors of one image, matched by the descriptor front end.
 #pragma once
 
 #include <Eigen/Dense>
@@ -13,8 +13,8 @@
 namespace roadfix {
 
 struct Keypoints {
-  std::vector<Eigen::Vector2f> pixels;  ///< of the picture as it came
-  std::vector<float> scores;            ///< the higher the better
+  std::vector<Eigen::Vector2f> pixels;  ///< raw image coordinates
+  std::vector<float> scores;            ///< higher is better
   cv::Mat descriptors;                  ///< one row each: CV_8U bits or CV_32F of unit norm
 };
 
@@ -25,27 +25,27 @@ class KeypointDetector {
   KeypointDetector& operator=(const KeypointDetector&) = delete;
   virtual ~KeypointDetector() = default;
   virtual Keypoints detect(const cv::Mat& gray) = 0;
-  /// Distance of descriptors above which two are not of one point.
+  /// Descriptor distance above which two keypoints do not match.
   [[nodiscard]] virtual double max_distance() const = 0;
 };
 
-/// FAST corners on a pyramid, spread over each level, and BRIEF along the direction of the intensity centroid (Rublee,
-/// Rabaud, Konolige, Bradski, ORB, 2011; the bit pattern is OpenCV's).
+/// FAST corners on a pyramid, distributed over each level, with BRIEF along the direction of the intensity centroid
+/// (Rublee, Rabaud, Konolige, Bradski, ORB, 2011; OpenCV's bit pattern).
 std::unique_ptr<KeypointDetector> make_orb(const FrontEndConfig& config);
-/// Lowe 2004, OpenCV's.
+/// Lowe 2004, OpenCV's implementation.
 std::unique_ptr<KeypointDetector> make_sift(const FrontEndConfig& config);
-/// DeTone, Malisiewicz, Rabinovich 2018: a network whose weights the user supplies, as ONNX bytes. Input 1 x 1 x H x W
-/// grey in [0, 1]; outputs `output_det` 1 x 65 x H/8 x W/8 (raw) and `output_desc` 1 x N x H/8 x W/8.
+/// DeTone, Malisiewicz, Rabinovich 2018: a network with weights supplied by the user, as ONNX bytes. Input 1 x 1 x H x
+/// W grey in [0, 1]; outputs `output_det` 1 x 65 x H/8 x W/8 (raw) and `output_desc` 1 x N x H/8 x W/8.
 std::unique_ptr<KeypointDetector> make_superpoint(const FrontEndConfig& config, std::span<const uint8_t> weights);
 
-/// BRIEF of given corners at the picture's own size, without those too near to its edge.
+/// BRIEF descriptors of given corners at full resolution, without corners too close to the edge.
 struct DescribedCorners {
-  std::vector<size_t> index;  ///< into the corners given
+  std::vector<size_t> index;  ///< into the given corners
   cv::Mat descriptors;        ///< CV_8U, one row for each
 };
 DescribedCorners describe_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> corners);
 
-/// Hamming distance of bits, Euclidean distance of numbers. Sums run in a fixed order.
+/// Hamming distance of binary, Euclidean distance of float descriptors. Sums run in a fixed order.
 double descriptor_distance(const cv::Mat& a, int row_a, const cv::Mat& b, int row_b);
 
 }  // namespace roadfix

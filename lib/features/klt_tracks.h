@@ -1,6 +1,6 @@
-/// Optical flow front end: corners followed from picture to picture. The last picture says roughly where (coarse to
-/// fine), the patch as it was first seen says exactly where: errors do not add up from picture to picture. The patch's
-/// shape is followed too, and it is taken anew once it has changed much. The cheap default.
+/// Optical flow front end. The previous image gives the approximate position (coarse to fine), the template patch the
+/// precise one, so that errors do not accumulate. The affine shape of the patch is estimated too; the template is
+/// updated once it has changed by much. The default, at the lowest cost.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ class KltTracks final : public FrontEnd {
  public:
   explicit KltTracks(const FrontEndConfig& config) : config_(config) {}
 
-  std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> hints) override;
+  std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> predictions) override;
   std::vector<Feature> replenish() override;
   void drop(std::span<const int64_t> tracks) override;
   void reset() override;
@@ -25,26 +25,26 @@ class KltTracks final : public FrontEnd {
 
  private:
   struct Track {
-    Feature feature;  ///< where it is in the last picture
+    Feature feature;  ///< position in the last image
     Patch patch;
-    Placement place;        ///< of the patch in the last picture
-    PatchModel<6> model{};  ///< of the patch; made again after a load
+    PatchAlignment alignment;  ///< of the patch in the last image
+    PatchModel<6> model{};     ///< of the template; recomputed after load()
   };
   [[nodiscard]] PatchConfig patch_config() const;
-  /// Moves the track to where the new picture shows it, near `expected`; false where it is not found.
-  [[nodiscard]] bool find(Track& track, const Eigen::Vector2f& expected, const FlowPyramid& pyramid) const;
-  /// Takes the track's patch anew from the picture that it was last found in; false where that is too near the edge.
-  static bool renew(Track& track, const cv::Mat& gray, int window_px);
-  /// Where each live track is expected: its hint, or where it was.
-  [[nodiscard]] std::vector<Eigen::Vector2f> expectations(std::span<const Feature> hints) const;
+  /// Finds the track in the new image near `expected`; false where it is not found.
+  [[nodiscard]] bool locate(Track& track, const Eigen::Vector2f& expected, const FlowPyramid& pyramid) const;
+  /// Replaces the template by the patch in the last image; false where that is too close to the edge.
+  static bool update_template(Track& track, const cv::Mat& gray, int window_px);
+  /// Predicted position of each active track: the given prediction, else its last position.
+  [[nodiscard]] std::vector<Eigen::Vector2f> predicted_pixels(std::span<const Feature> predictions) const;
   [[nodiscard]] std::vector<Feature> features() const;
 
   FrontEndConfig config_;
   int64_t next_track_ = 1;
   int num_expected_ = 0;
-  std::vector<Track> live_;  ///< ascending by number
-  FlowPyramid spare_;        ///< of the picture before, for its memory
-  FlowPyramid pyramid_;      ///< of the last picture
+  std::vector<Track> tracks_;  ///< ascending by number
+  FlowPyramid reuse_;          ///< previous pyramid, for its memory
+  FlowPyramid pyramid_;        ///< of the last image
 };
 
 }  // namespace roadfix

@@ -1,4 +1,4 @@
-/// ORB keypoints, and the distances of descriptors.
+/// ORB keypoints and descriptor distances.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -15,10 +15,10 @@ namespace {
 constexpr double kLevelFactor = 1.2;
 constexpr int kPatch = 31;  ///< px, of OpenCV's bit pattern
 constexpr int kHalf = kPatch / 2;
-constexpr int kBorder = 19;      ///< what the turned pattern reaches over, px of a level
-constexpr double kPerTrack = 3;  ///< keypoints for one track: what is matched against must be richer than the tracks
+constexpr int kBorder = 19;               ///< margin of the rotated pattern, px of a level
+constexpr double kKeypointsPerTrack = 3;  ///< more keypoints than tracks, so that matching has alternatives
 
-/// Half the width of a disc of radius kHalf, by the distance of the row from its middle.
+/// Half the width of a disc of radius kHalf, by the row's distance from its centre.
 constexpr std::array<int, kHalf + 1> kReach = [] {
   std::array<int, kHalf + 1> reach{};
   for (int dy = 0; dy <= kHalf; ++dy) {
@@ -28,7 +28,7 @@ constexpr std::array<int, kHalf + 1> kReach = [] {
   return reach;
 }();
 
-/// Direction from a corner to the centroid of the intensities around it, degrees. Sums are integers.
+/// Direction from a corner to the intensity centroid around it, degrees. Sums are integers.
 float centroid_angle(const cv::Mat& gray, int u, int v) {
   int32_t mx = 0, my = 0;  // at most 709 pixels of 255, 15 away
   for (int dy = -kHalf; dy <= kHalf; ++dy) {
@@ -62,7 +62,7 @@ class Orb final : public KeypointDetector {
       cv::Mat small = gray;
       if (level > 0) cv::resize(gray, small, {}, shrink, shrink, cv::INTER_LINEAR);
       CornerConfig corners;
-      corners.max_corners = static_cast<int>(kPerTrack * config_.max_features * shrink * shrink / area);
+      corners.max_corners = static_cast<int>(kKeypointsPerTrack * config_.max_features * shrink * shrink / area);
       corners.min_distance_px = std::max(3.0, 0.3 * config_.min_distance_px);
       corners.fast_threshold = config_.fast_threshold;
       corners.border_px = kBorder;

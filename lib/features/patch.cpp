@@ -8,15 +8,16 @@
 namespace roadfix {
 namespace {
 
-constexpr int kLanes = 8;  ///< sums run in so many columns: a fixed order that fits vector registers
+constexpr int kLanes = 8;  ///< parallel partial sums: a fixed order that fits vector registers
 constexpr int kMaxPixels = (kMaxPatchWindow * kMaxPatchWindow + kLanes - 1) / kLanes * kLanes;
 constexpr int kMaxIterations = 20;
-constexpr float kEnoughPx = 0.02F;                  ///< a step that moves no pixel of the patch by more is the last
-constexpr float kShortest = 0.5F, kLongest = 1.5F;  ///< factor of a step, see Stretch
-constexpr int kHopelessAfter = 3;                   ///< steps; a patch that is there is nearly found by then
-constexpr float kHopeless = 0.75F;                  ///< times the correlation asked for: less by then is another thing
-constexpr float kGreyNoise = 3.0F;                  ///< grey levels: the camera's and interpolation's
-constexpr float kMaxPlaceStd_px = 0.3F;             ///< that this noise gives the place; more: the patch is flat
+constexpr float kConvergencePx = 0.02F;                        ///< converged when no pixel of the patch moves by more
+constexpr float kMinStepFactor = 0.5F, kMaxStepFactor = 1.5F;  ///< limits of the step factor, see StepScaling
+constexpr int kEarlyExitIterations = 3;         ///< iterations after which a correct patch is nearly aligned
+constexpr float kEarlyExitCorrelation = 0.75F;  ///< of the required correlation, for early rejection
+constexpr float kIntensityNoise = 3.0F;         ///< grey levels: sensor noise and interpolation
+constexpr float kMaxPositionStd_px = 0.3F;      ///< position sigma from this noise; above it the patch has too
+                                                ///< little texture
 constexpr float kMinGain = 0.1F, kMaxGain = 10.0F;
 
 using Pixels = std::array<float, kMaxPixels>;
@@ -49,8 +50,7 @@ void centre(float* pixels, int count) {
   for (int i = 0; i < count; ++i) pixels[i] -= mean;
 }
 
-/// Grey levels, and their derivatives by place (and shape, in pixels at the patch's edge). Pixels beyond the last are
-/// zero.
+/// Intensities and their derivatives by position (and shape, in pixels at the patch's edge). Padding is zero.
 template <int N>
 void read_pixels(const Patch& patch, int side, PatchModel<N>& m) {
   const ptrdiff_t n = padded(m.count), stride = side + 2;
@@ -78,7 +78,7 @@ void read_pixels(const Patch& patch, int side, PatchModel<N>& m) {
   }
 }
 
-/// Takes mean and grey pattern out of the derivatives. False where the patch is too flat.
+/// Removes mean and intensity pattern from the derivatives. False where the texture is too weak.
 template <int N>
 bool prepare(const Patch& patch, int side, float prior, PatchModel<N>& m) {
   m.count = side * side;
@@ -101,12 +101,12 @@ bool prepare(const Patch& patch, int side, float prior, PatchModel<N>& m) {
   }
   const Eigen::LDLT<Square<N>> factors(H);
   m.inverse = factors.solve(Square<N>::Identity());
-  const float widest = m.inverse.template topLeftCorner<2, 2>().trace();  // at least the larger eigenvalue
+  const float widest = m.inverse.template topLeftCorner<2, 2>().trace();  // upper bound of the larger eigenvalue
   return factors.info() == Eigen::Success && widest >= 0.0F &&
-         kGreyNoise * kGreyNoise * widest < kMaxPlaceStd_px * kMaxPlaceStd_px;
+         kIntensityNoise * kIntensityNoise * widest < kMaxPositionStd_px * kMaxPositionStd_px;
 }
 
-/// Offsets of a patch's pixels from its centre.
+/// Offsets of the patch's pixels from its centre.
 struct Grid {
   explicit Grid(int side) : count(static_cast<size_t>(side) * static_cast<size_t>(side)) {
     const int half = side / 2;
@@ -122,22 +122,22 @@ struct Grid {
   Pixels x, y;
 };
 
-/// Grey levels where the placement puts the patch's pixels; false where one lies outside the picture. In three passes,
-/// so that all but the loads themselves run in vector registers.
-bool sample(const cv::Mat& gray, const Placement& place, int side, const Grid& grid, Pixels& out) {
+/// Intensities at the aligned pixels; false where one lies outside the image. In three passes, so that all but the
+/// loads run in vector registers.
+bool sample(const cv::Mat& gray, const PatchAlignment& at, int side, const Grid& grid, Pixels& out) {
   constexpr float kEdge = 0.01F;  // px, for rounding
   const int half = side / 2;
-  const Eigen::Vector2f reach = place.shape.cwiseAbs().rowwise().sum() * static_cast<float>(half);
-  const Eigen::Vector2f low = place.centre - reach, high = place.centre + reach;
+  const Eigen::Vector2f reach = at.shape.cwiseAbs().rowwise().sum() * static_cast<float>(half);
+  const Eigen::Vector2f low = at.centre - reach, high = at.centre + reach;
   if (!(low.x() >= kEdge && low.y() >= kEdge && high.x() < static_cast<float>(gray.cols - 1) - kEdge &&
         high.y() < static_cast<float>(gray.rows - 1) - kEdge)) {
     return false;
   }
   std::array<int32_t, kMaxPixels> where;
   Pixels a, b;
-  std::array<uint16_t, kMaxPixels> upper, lower;  // two neighbours, the left one's byte is the low one (x86-64, ARM64)
-  const float u0 = place.centre.x(), uu = place.shape(0, 0), uv = place.shape(0, 1);
-  const float v0 = place.centre.y(), vu = place.shape(1, 0), vv = place.shape(1, 1);
+  std::array<uint16_t, kMaxPixels> upper, lower;  // two neighbours, the left one in the low byte (x86-64, ARM64)
+  const float u0 = at.centre.x(), uu = at.shape(0, 0), uv = at.shape(0, 1);
+  const float v0 = at.centre.y(), vu = at.shape(1, 0), vv = at.shape(1, 1);
   const auto step = static_cast<int32_t>(gray.step[0]);
   for (size_t k = 0; k < grid.count; ++k) {
     const float u = u0 + uu * grid.x[k] + uv * grid.y[k], v = v0 + vu * grid.x[k] + vv * grid.y[k];
@@ -160,31 +160,33 @@ bool sample(const cv::Mat& gray, const Placement& place, int side, const Grid& g
   return true;
 }
 
-/// Steps of a fixed matrix are all too long or all too short (central differences make fine texture flatter than it is,
-/// a blurred picture's is steeper): what the last one left over says by how much (Aitken's extrapolation along it).
+/// Steps with a fixed matrix are consistently too long or too short (central differences underestimate fine texture, a
+/// blurred image has less): the remainder of the last step gives the factor (Aitken's extrapolation).
 template <int N>
-class Stretch {
+class StepScaling {
  public:
   Vector<N> of(const Vector<N>& step) {
-    const float gained = (asked_ - step).dot(moved_);
-    const float factor = gained > 0.0F ? std::clamp(moved_.squaredNorm() / gained, kShortest, kLongest) : 1.0F;
-    asked_ = step;
-    moved_ = factor * step;
-    return moved_;
+    const float reduction = (last_step_ - step).dot(last_scaled_step_);
+    const float factor = reduction > 0.0F
+                             ? std::clamp(last_scaled_step_.squaredNorm() / reduction, kMinStepFactor, kMaxStepFactor)
+                             : 1.0F;
+    last_step_ = step;
+    last_scaled_step_ = factor * step;
+    return last_scaled_step_;
   }
 
  private:
-  Vector<N> asked_ = Vector<N>::Zero(), moved_ = Vector<N>::Zero();
+  Vector<N> last_step_ = Vector<N>::Zero(), last_scaled_step_ = Vector<N>::Zero();
 };
 
 template <int N>
-std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::Mat& gray, const Placement& start,
-                               const PatchConfig& config) {
+std::optional<PatchAlignment> align(const Patch& patch, PatchModel<N>& m, const cv::Mat& gray,
+                                    const PatchAlignment& start, const PatchConfig& config) {
   const int side = config.window_px, half_px = side / 2;
   const auto half = static_cast<float>(half_px);
-  const float reach = config.reach_px > 0.0F ? config.reach_px : 2.0F * half;
+  const float reach = config.max_displacement_px > 0.0F ? config.max_displacement_px : 2.0F * half;
   const float edge_std = half * static_cast<float>(config.shape_std);
-  const float prior = N == 6 ? kGreyNoise * kGreyNoise / (edge_std * edge_std) : 0.0F;
+  const float prior = N == 6 ? kIntensityNoise * kIntensityNoise / (edge_std * edge_std) : 0.0F;
   if (m.count == 0) m.flat = !prepare(patch, side, prior, m);
   if (m.flat) return std::nullopt;
   const int n = padded(m.count);
@@ -192,8 +194,8 @@ std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::M
   const Grid grid(side);
   const Eigen::Matrix2f start_inverse = start.shape.inverse();
   const auto min_correlation = static_cast<float>(config.min_correlation);
-  Placement now = start;
-  Stretch<N> stretch;
+  PatchAlignment now = start;
+  StepScaling<N> step_scaling;
   Pixels pixels;
   const float* seen = pixels.data();
   std::fill(pixels.begin() + m.count, pixels.begin() + n, 0.0F);
@@ -201,17 +203,18 @@ std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::M
     if (!sample(gray, now, side, grid, pixels)) return std::nullopt;
     const float mean = sum_of(seen, n) / static_cast<float>(m.count);
     const float spread = dot(seen, seen, n) - mean * mean * static_cast<float>(m.count);
-    const float gain = std::sqrt(spread / m.energy);  // also where the patches do not match yet
+    const float gain = std::sqrt(spread / m.energy);  // also before the patches match
     if (!(gain > kMinGain && gain < kMaxGain)) return std::nullopt;
     now.correlation = dot(value, seen, n) / (gain * m.energy);
-    if (iteration >= kHopelessAfter && now.correlation < kHopeless * min_correlation) return std::nullopt;
+    if (iteration >= kEarlyExitIterations && now.correlation < kEarlyExitCorrelation * min_correlation)
+      return std::nullopt;
     Vector<N> b;
     for (int k = 0; k < N; ++k) b[k] = dot(value + static_cast<ptrdiff_t>(k + 1) * n, seen, n) / gain;
     if constexpr (N == 6) {
       const Eigen::Matrix2f off = start_inverse * now.shape - Eigen::Matrix2f::Identity();
       b.template tail<4>() += prior * half * Vector<4>(off(0, 0), off(0, 1), off(1, 0), off(1, 1));
     }
-    const Vector<N> step = stretch.of(m.inverse * b);
+    const Vector<N> step = step_scaling.of(m.inverse * b);
     Eigen::Matrix2f change = Eigen::Matrix2f::Identity();
     if constexpr (N == 6) {
       change += (Eigen::Matrix2f() << step[2], step[3], step[4], step[5]).finished() / half;
@@ -220,7 +223,7 @@ std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::M
     now.centre -= now.shape * step.template head<2>();
     if (!now.centre.allFinite() || !now.shape.allFinite()) return std::nullopt;
     if ((now.centre - start.centre).cwiseAbs().maxCoeff() > reach) return std::nullopt;
-    if (step.cwiseAbs().maxCoeff() < kEnoughPx) break;
+    if (step.cwiseAbs().maxCoeff() < kConvergencePx) break;
   }
   if (now.correlation < min_correlation) return std::nullopt;
   return now;
@@ -228,7 +231,7 @@ std::optional<Placement> place(const Patch& patch, PatchModel<N>& m, const cv::M
 
 }  // namespace
 
-std::optional<Patch> cut_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel, int window_px) {
+std::optional<Patch> extract_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel, int window_px) {
   const int reach = window_px / 2 + 1;
   if (!pixel.allFinite() || pixel.cwiseAbs().maxCoeff() > 1e6F) return std::nullopt;
   const auto u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
@@ -244,16 +247,16 @@ std::optional<Patch> cut_patch(const cv::Mat& gray, const Eigen::Vector2f& pixel
   return patch;
 }
 
-std::optional<Placement> place_patch(const Patch& patch, const cv::Mat& gray, const Placement& start,
-                                     const PatchConfig& config) {
+std::optional<PatchAlignment> align_patch(const Patch& patch, const cv::Mat& gray, const PatchAlignment& start,
+                                          const PatchConfig& config) {
   PatchModel<2> rigid;
   PatchModel<6> model;
-  return config.shape_std > 0.0 ? place(patch, model, gray, start, config) : place(patch, rigid, gray, start, config);
+  return config.shape_std > 0.0 ? align(patch, model, gray, start, config) : align(patch, rigid, gray, start, config);
 }
 
-std::optional<Placement> place_patch(const Patch& patch, PatchModel<6>& model, const cv::Mat& gray,
-                                     const Placement& start, const PatchConfig& config) {
-  return place(patch, model, gray, start, config);
+std::optional<PatchAlignment> align_patch(const Patch& patch, PatchModel<6>& model, const cv::Mat& gray,
+                                          const PatchAlignment& start, const PatchConfig& config) {
+  return align(patch, model, gray, start, config);
 }
 
 }  // namespace roadfix

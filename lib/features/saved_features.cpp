@@ -20,7 +20,7 @@ std::vector<Feature> load_features(StateReader& reader) {
   return features;
 }
 
-void save_picture(const cv::Mat& gray, StateWriter& writer) {
+void save_image(const cv::Mat& gray, StateWriter& writer) {
   writer.put(gray.rows);
   writer.put(gray.cols);
   std::vector<uint8_t> pixels;
@@ -31,7 +31,7 @@ void save_picture(const cv::Mat& gray, StateWriter& writer) {
   writer.put(std::span<const uint8_t>(pixels));
 }
 
-cv::Mat load_picture(StateReader& reader) {
+cv::Mat load_image(StateReader& reader) {
   const int rows = reader.get<int>(), cols = reader.get<int>();
   std::vector<uint8_t> pixels;
   reader.get(pixels);

@@ -1,4 +1,4 @@
-/// What front ends have in common in a saved state: features and pictures.
+/// Serialisation of features and images, shared by the front ends.
 #pragma once
 
 #include "features/front_end.h"
@@ -8,8 +8,8 @@ namespace roadfix {
 void save_features(std::span<const Feature> features, StateWriter& writer);
 std::vector<Feature> load_features(StateReader& reader);
 
-/// 8-bit grey; an empty picture is one too.
-void save_picture(const cv::Mat& gray, StateWriter& writer);
-cv::Mat load_picture(StateReader& reader);
+/// 8-bit grey; may be empty.
+void save_image(const cv::Mat& gray, StateWriter& writer);
+cv::Mat load_image(StateReader& reader);
 
 }  // namespace roadfix

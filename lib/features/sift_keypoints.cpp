@@ -7,7 +7,7 @@ namespace {
 
 class Sift final : public KeypointDetector {
  public:
-  explicit Sift(const FrontEndConfig& config) : sift_(cv::SIFT::create(kPerTrack * config.max_features)) {}
+  explicit Sift(const FrontEndConfig& config) : sift_(cv::SIFT::create(kKeypointsPerTrack * config.max_features)) {}
 
   Keypoints detect(const cv::Mat& gray) override {
     std::vector<cv::KeyPoint> keys;
@@ -25,10 +25,13 @@ class Sift final : public KeypointDetector {
     return out;
   }
 
-  [[nodiscard]] double max_distance() const override { return 0.6; }  // of unit vectors; unlike ones have about 1
+  [[nodiscard]] double max_distance() const override {
+    return 0.6;
+  }  // of unit vectors; unrelated descriptors have
+     // about 1
 
  private:
-  static constexpr int kPerTrack = 4;
+  static constexpr int kKeypointsPerTrack = 4;
   cv::Ptr<cv::SIFT> sift_;
 };
 

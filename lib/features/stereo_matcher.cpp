@@ -10,19 +10,20 @@
 namespace roadfix {
 namespace {
 
-constexpr int kSearchLevel = 1;   ///< of the pyramid: half the size
-constexpr int kSearchHalf = 4;    ///< patches of 9 x 9 pixels at that level
-constexpr float kNear_px = 3.0F;  ///< from a known depth or the coarse search; farther off it goes from coarse to fine
+constexpr int kSearchLevel = 1;         ///< of the pyramid: half the size
+constexpr int kSearchHalf = 4;          ///< patches of 9 x 9 pixels at that level
+constexpr float kFineSearch_px = 3.0F;  ///< from a known depth or the coarse search; beyond it the alignment is coarse
+                                        ///< to fine
 
 constexpr size_t kSide = 2 * kSearchHalf + 1;
 constexpr int64_t kPatch = kSide * kSide;
-constexpr int kLanes = 8;  ///< columns that run side by side; the ninth goes by itself
+constexpr int kLanes = 8;  ///< columns processed in parallel; the ninth is separate
 
-/// A patch of the left picture, and how alike places of the right one are. Integers: exact up to one division.
-class Searched {
+/// A patch of the left image and its normalised correlation with the right one. Integers: exact up to one division.
+class SearchPatch {
  public:
-  /// Around (u, v), which fits().
-  Searched(const cv::Mat& gray, int u, int v) {
+  /// Centred at (u, v); requires fits().
+  SearchPatch(const cv::Mat& gray, int u, int v) {
     for (size_t row = 0; row < kSide; ++row) {
       const uint8_t* line = gray.ptr<uint8_t>(v - kSearchHalf + static_cast<int>(row)) + (u - kSearchHalf);
       for (size_t column = 0; column < kSide; ++column) {
@@ -43,17 +44,17 @@ class Searched {
     int64_t sum = 0, square = 0, product = 0;
     for (size_t row = 0; row < kSide; ++row) {
       const uint8_t* line = gray.ptr<uint8_t>(v - kSearchHalf + static_cast<int>(row)) + (u - kSearchHalf);
-      const int32_t* mine = value_.data() + row * kSide;
+      const int32_t* reference = value_.data() + row * kSide;
       for (size_t k = 0; k < kLanes; ++k) {
         const int32_t value = line[k];
         sums[k] += value;
         squares[k] += value * value;
-        products[k] += value * mine[k];
+        products[k] += value * reference[k];
       }
       const int32_t value = line[kLanes];
       sum += value;
       square += value * value;
-      product += value * mine[kLanes];
+      product += value * reference[kLanes];
     }
     for (size_t k = 0; k < kLanes; ++k) {
       sum += sums[k];
@@ -67,7 +68,7 @@ class Searched {
  private:
   std::array<int32_t, kPatch> value_{};
   int64_t sum_ = 0;
-  int64_t variance_ = 0;  ///< times the number of pixels, squared
+  int64_t variance_ = 0;  ///< times the squared number of pixels
 };
 
 }  // namespace
@@ -75,17 +76,17 @@ class Searched {
 StereoMatcher::StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left,
                              const StereoConfig& config)
     : left_(left), right_(right), config_(config) {
-  turn(T_right_left);
+  set_extrinsics(T_right_left);
 }
 
-void StereoMatcher::turn(const SE3& T_right_left) {
+void StereoMatcher::set_extrinsics(const SE3& T_right_left) {
   T_right_left_ = T_right_left;
   E_ = skew(T_right_left.p) * T_right_left.R();
 }
 
 std::optional<Eigen::Vector2f> StereoMatcher::right_pixel(const Eigen::Vector2d& normalised,
                                                           double inverse_depth) const {
-  // The point in right axes times its inverse depth: finite for a point at infinity too.
+  // The point in right-camera axes times its inverse depth: finite at infinity too.
   const Eigen::Vector3d p = T_right_left_.q * normalised.homogeneous() + inverse_depth * T_right_left_.p;
   const auto pixel = right_.project(p);
   if (!pixel) return std::nullopt;
@@ -101,8 +102,8 @@ std::optional<Eigen::Vector2f> StereoMatcher::search(const cv::Mat& left, const 
                            static_cast<int>(std::lround(p.y() * kShrink)));
   };
   const Eigen::Vector2i centre = round_to_level(pixel);
-  if (!Searched::fits(left, centre.x(), centre.y())) return std::nullopt;
-  const Searched wanted(left, centre.x(), centre.y());
+  if (!SearchPatch::fits(left, centre.x(), centre.y())) return std::nullopt;
+  const SearchPatch wanted(left, centre.x(), centre.y());
 
   // Inverse depth in steps of about one pixel of the search level.
   const double nearest = 1.0 / config_.min_depth_m;
@@ -114,11 +115,11 @@ std::optional<Eigen::Vector2f> StereoMatcher::search(const cv::Mat& left, const 
   for (int i = 0; i <= steps; ++i) {
     const auto candidate = right_pixel(normalised, nearest * i / steps);
     if (!candidate) continue;
-    // The way is rounded, not the place: both patches then lie alike between the pixels of the level.
+    // The displacement is rounded, not the position: both patches then have the same subpixel phase.
     const Eigen::Vector2i at = centre + round_to_level(*candidate - pixel);
     if (at == last) continue;
     last = at;
-    if (!Searched::fits(right, at.x(), at.y())) continue;
+    if (!SearchPatch::fits(right, at.x(), at.y())) continue;
     const double score = wanted.correlation(right, at.x(), at.y());
     if (score > best) {
       best = score;
@@ -141,21 +142,22 @@ std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& 
   if (left_pyramid.levels.size() <= kSearchLevel || right_pyramid.levels.size() <= kSearchLevel) return result;
   const PatchConfig patches{config_.window_px, config_.min_correlation, config_.shape_std};
   PatchConfig near = patches;
-  near.reach_px = kNear_px;
+  near.max_displacement_px = kFineSearch_px;
   for (size_t i = 0; i < queries.size(); ++i) {
     const auto normalised = left_.unproject(queries[i].pixel.cast<double>());
-    const auto patch = cut_patch(left, queries[i].pixel, patches.window_px);
+    const auto patch = extract_patch(left, queries[i].pixel, patches.window_px);
     if (!normalised || !patch) continue;
     const auto begin = queries[i].depth ? right_pixel(*normalised, 1.0 / *queries[i].depth)
-                                        : search(left_pyramid.picture(kSearchLevel),
-                                                 right_pyramid.picture(kSearchLevel), queries[i].pixel, *normalised);
+                                        : search(left_pyramid.image(kSearchLevel), right_pyramid.image(kSearchLevel),
+                                                 queries[i].pixel, *normalised);
     if (!begin) continue;
-    Placement start;
+    PatchAlignment start;
     start.centre = *begin - patch->offset;
-    auto place = place_patch(*patch, right, start, near);
+    auto place = align_patch(*patch, right, start, near);
     if (!place) {
-      start.centre = approach(left_pyramid, right_pyramid, queries[i].pixel, *begin, patches.window_px) - patch->offset;
-      place = place_patch(*patch, right, start, patches);
+      start.centre =
+          coarse_to_fine_flow(left_pyramid, right_pyramid, queries[i].pixel, *begin, patches.window_px) - patch->offset;
+      place = align_patch(*patch, right, start, patches);
     }
     if (!place) continue;
     const Eigen::Vector2f found = place->point(*patch);

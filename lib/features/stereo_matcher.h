@@ -1,6 +1,6 @@
-/// Finds points of the left picture in the right one: a coarse search along the epipolar curve, then the patch's place
-/// and shape (a road at a slant is sheared), then a test of the distance from the curve. Works for any two overlapping
-/// cameras; nothing is rectified.
+/// Matches points of the left image in the right one: a coarse search along the epipolar curve, then alignment with
+/// affine shape (slanted road surfaces are sheared), then a test of the epipolar distance. Works for any two
+/// overlapping cameras, without rectification.
 #pragma once
 
 #include <Eigen/Dense>
@@ -15,11 +15,11 @@
 namespace roadfix {
 
 struct StereoConfig {
-  double min_depth_m = 2.0;      ///< nearest point that is looked for
-  double max_epipolar_px = 1.0;  ///< distance from the epipolar line
-  double min_correlation = 0.8;  ///< of the coarse patches and of the fine ones, normalised
+  double min_depth_m = 2.0;      ///< nearest point that is searched
+  double max_epipolar_px = 1.0;  ///< distance from the epipolar line, upper limit
+  double min_correlation = 0.8;  ///< normalised, of coarse and fine patches
   int window_px = 11;            ///< of the fine patches, odd
-  double shape_std = 0.2;        ///< of each number of a patch's shape in the right eye
+  double shape_std = 0.2;        ///< prior sigma of each shape parameter in the right image
 };
 
 template <class Visitor>
@@ -33,32 +33,32 @@ void visit(StereoConfig& c, Visitor& v) {
 }
 
 struct StereoQuery {
-  Eigen::Vector2f pixel;        ///< in the left picture
-  std::optional<double> depth;  ///< m along the left camera's z, where it is known already
+  Eigen::Vector2f pixel;        ///< in the left image
+  std::optional<double> depth;  ///< m along the left camera's z, where known
   int64_t track = 0;            ///< of the feature
 };
 
-/// Where the right eye sees what the left one does.
-class RightFinder {
+/// Interface: position of left-image points in the right image.
+class RightImageMatcher {
  public:
-  RightFinder() = default;
-  virtual ~RightFinder() = default;
-  RightFinder(const RightFinder&) = default;
-  RightFinder& operator=(const RightFinder&) = default;
+  RightImageMatcher() = default;
+  virtual ~RightImageMatcher() = default;
+  RightImageMatcher(const RightImageMatcher&) = default;
+  RightImageMatcher& operator=(const RightImageMatcher&) = default;
 
-  /// Takes a better estimate of where the right eye is.
-  virtual void turn(const SE3& T_right_left) = 0;
+  /// Sets refined extrinsics of the right camera.
+  virtual void set_extrinsics(const SE3& T_right_left) = 0;
 
-  /// The right pixel of each query, or nothing.
+  /// The right pixel of each query, or no value.
   [[nodiscard]] virtual std::vector<std::optional<Eigen::Vector2f>> match(
       const cv::Mat& left, const cv::Mat& right, std::span<const StereoQuery> queries) const = 0;
 };
 
-class StereoMatcher final : public RightFinder {
+class StereoMatcher final : public RightImageMatcher {
  public:
   StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left, const StereoConfig& config);
 
-  void turn(const SE3& T_right_left) override;
+  void set_extrinsics(const SE3& T_right_left) override;
   [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat& left, const cv::Mat& right,
                                                                   std::span<const StereoQuery> queries) const override;
 

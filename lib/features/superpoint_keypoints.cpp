@@ -9,11 +9,11 @@
 namespace roadfix {
 namespace {
 
-constexpr int kCell = 8;  ///< px of the network's input that share one cell of its outputs
+constexpr int kCell = 8;  ///< px of the network's input per output cell
 constexpr int kBorder = 4;
-constexpr int kQuietRadius = 4;  ///< px of the input in which the best keypoint silences the others, as published
+constexpr int kSuppressionRadius = 4;  ///< px of the input: radius of non-maximum suppression, as published
 
-/// Probability of a corner in each pixel of the network's input: softmax over a cell's 64 pixels and "none".
+/// Corner probability of each pixel of the network's input: softmax over a cell's 64 pixels and "no corner".
 cv::Mat heat_map(const cv::Mat& detection, int rows, int cols) {
   cv::Mat heat(rows * kCell, cols * kCell, CV_32F);
   const auto plane = static_cast<size_t>(rows) * static_cast<size_t>(cols);
@@ -34,7 +34,7 @@ cv::Mat heat_map(const cv::Mat& detection, int rows, int cols) {
   return heat;
 }
 
-/// Where the parabola through three values has its top, in (-0.5, 0.5).
+/// Vertex of the parabola through three values, in (-0.5, 0.5).
 float parabola_top(float before, float middle, float after) {
   const float curvature = before - 2.0F * middle + after;
   return curvature < 0.0F ? std::clamp(0.5F * (before - after) / curvature, -0.5F, 0.5F) : 0.0F;
@@ -77,7 +77,7 @@ class SuperPoint final : public KeypointDetector {
     const Eigen::Vector2f grow(static_cast<float>(gray.cols) / static_cast<float>(size.width),
                                static_cast<float>(gray.rows) / static_cast<float>(size.height));
     for (Eigen::Vector2f& p : found.pixels) {
-      p = ((p.array() + 0.5F) * grow.array() - 0.5F).matrix();  // centres of pixels on centres of pixels
+      p = ((p.array() + 0.5F) * grow.array() - 0.5F).matrix();  // pixel-centre convention
     }
     return found;
   }
@@ -87,7 +87,7 @@ class SuperPoint final : public KeypointDetector {
  private:
   [[nodiscard]] Keypoints peaks(const cv::Mat& heat) const {
     cv::Mat largest;
-    const int width = 2 * kQuietRadius + 1;
+    const int width = 2 * kSuppressionRadius + 1;
     cv::dilate(heat, largest, cv::getStructuringElement(cv::MORPH_RECT, {width, width}));
     Keypoints out;
     for (int r = kBorder; r < heat.rows - kBorder; ++r) {
@@ -103,7 +103,7 @@ class SuperPoint final : public KeypointDetector {
     return out;
   }
 
-  /// Bilinear samples of the coarse descriptors, to unit norm.
+  /// Bilinear interpolation of the coarse descriptors, normalised.
   static void describe(const cv::Mat& coarse, int rows, int cols, Keypoints& keypoints) {
     const int length = coarse.size[1];
     const auto plane = static_cast<size_t>(rows) * static_cast<size_t>(cols);

@@ -222,7 +222,7 @@ void TrackDepths::keep(const Camera& lens, std::span<const Feature> features, co
     const auto ray = lens.unproject(k.pixel);
     if (!ray) continue;
     k.ray = *ray;
-    const auto patch = cut_patch(picture, feature.pixel, kPatch_px);
+    const auto patch = extract_patch(picture, feature.pixel, kPatch_px);
     if (patch) k.patch = patch->grey;
     next.push_back(std::move(k));
   }

@@ -200,7 +200,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
       }
       queries.push_back(query);
     }
-    stereo_->turn(map_.lens().turned(rig_.T_right_left));
+    stereo_->set_extrinsics(map_.lens().turned(rig_.T_right_left));
     right = stereo_->match(frame.left, frame.right, queries);
     show_right(all, right);
   }

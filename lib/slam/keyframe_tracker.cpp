@@ -62,7 +62,7 @@ LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRi
 
 KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig,
                                  std::unique_ptr<FrontEnd> front_end, Executor& executor,
-                                 std::unique_ptr<RightFinder> right_finder)
+                                 std::unique_ptr<RightImageMatcher> right_matcher)
     : config_(fitted(config)),
       rig_(rig),
       left_(rig.left),
@@ -72,7 +72,7 @@ KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const Came
       T_map_camera_(rig.T_vehicle_left),
       loops_(loop_config(config_, rig)) {
   if (!rig.right) return;
-  stereo_ = std::move(right_finder);
+  stereo_ = std::move(right_matcher);
   if (!stereo_) {
     stereo_ = std::make_unique<StereoMatcher>(left_, Camera(*rig.right), rig.T_right_left, config.stereo);
   }

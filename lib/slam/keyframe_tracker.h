@@ -121,9 +121,9 @@ struct MonoStart {
 
 class KeyframeTracker {
  public:
-  /// `right_finder`: for simulated tracks; without it pictures are matched.
+  /// `right_matcher`: for simulated tracks; without it pictures are matched.
   KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig, std::unique_ptr<FrontEnd> front_end,
-                  Executor& executor, std::unique_ptr<RightFinder> right_finder = nullptr);
+                  Executor& executor, std::unique_ptr<RightImageMatcher> right_matcher = nullptr);
   ~KeyframeTracker();
   KeyframeTracker(const KeyframeTracker&) = delete;
   KeyframeTracker& operator=(const KeyframeTracker&) = delete;
@@ -251,7 +251,7 @@ class KeyframeTracker {
   KeyframeTrackerConfig config_;
   CameraRig rig_;
   Camera left_;
-  std::unique_ptr<RightFinder> stereo_;  ///< null without a right eye
+  std::unique_ptr<RightImageMatcher> stereo_;  ///< null without a right eye
   std::unique_ptr<FrontEnd> front_end_;
   Executor& executor_;
   LocalMap map_;

@@ -53,10 +53,10 @@ class SimulatedFrontEnd final : public FrontEnd {
   int num_expected_ = 0;
 };
 
-class SimulatedRightEye final : public RightFinder {
+class SimulatedRightEye final : public RightImageMatcher {
  public:
   explicit SimulatedRightEye(std::shared_ptr<const SeenTracks> seen) : seen_(std::move(seen)) {}
-  void turn(const SE3&) override {}
+  void set_extrinsics(const SE3&) override {}
   [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat&, const cv::Mat&,
                                                                   std::span<const StereoQuery> queries) const override {
     std::vector<std::optional<Eigen::Vector2f>> found;

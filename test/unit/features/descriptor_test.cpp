@@ -1,4 +1,4 @@
-/// The descriptor front ends, held to what they share and to how well each can place a track.
+/// Tests common to the descriptor front ends, and their localisation accuracy.
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <iterator>
@@ -17,9 +17,9 @@ using test::texture;
 
 struct Kind {
   FrontEndKind kind;
-  double median_px;  ///< where half of the tracks must be
-  double share;      ///< of tracks found again
-  size_t least;      ///< tracks begun
+  double median_px;  ///< limit of the median error
+  double share;      ///< of tracks found again, lower limit
+  size_t least;      ///< tracks started, lower limit
 };
 
 std::vector<uint8_t> superpoint_weights() {
@@ -35,7 +35,7 @@ FrontEndConfig config_of(FrontEndKind kind) {
   return config;
 }
 
-/// Distances of the tracks found again from where they must be after a move of the picture.
+/// Errors of the tracks found again after a known shift of the image.
 std::vector<float> errors_after_move(FrontEnd& front_end, double du, double dv, size_t& begun_count) {
   const cv::Mat first = texture(640, 240, 5, 9);
   CHECK(front_end.track(first, {}).empty());
@@ -63,8 +63,8 @@ void check_moves(const Kind& kind, std::span<const uint8_t> weights) {
 
 void check_drop_and_state(FrontEndKind kind, std::span<const uint8_t> weights) {
   const auto front_end = make_front_end(config_of(kind), weights);
-  const cv::Mat picture = texture(640, 240, 5, 9);
-  (void)front_end->track(picture, {});
+  const cv::Mat image = texture(640, 240, 5, 9);
+  (void)front_end->track(image, {});
   const auto begun = front_end->replenish();
   REQUIRE(begun.size() > 10);
   const std::vector<int64_t> dropped{begun[0].track, begun[1].track};
@@ -76,7 +76,7 @@ void check_drop_and_state(FrontEndKind kind, std::span<const uint8_t> weights) {
   StateReader reader(state);
   resumed->load(reader);
   reader.finish();
-  const cv::Mat next = shifted(picture, 3.0, 1.0);
+  const cv::Mat next = shifted(image, 3.0, 1.0);
   const auto a = front_end->track(next, {}), b = resumed->track(next, {});
   REQUIRE(a.size() == b.size());
   REQUIRE(!a.empty());
@@ -87,39 +87,39 @@ void check_drop_and_state(FrontEndKind kind, std::span<const uint8_t> weights) {
   }
   for (const Feature& f : front_end->replenish()) REQUIRE(f.track > begun.back().track);
   for (int i = 0; i < 4; ++i) CHECK(front_end->track(cv::Mat::zeros(240, 640, CV_8UC1), {}).empty());
-  CHECK(front_end->track(picture, {}).empty());  // after so much darkness all have ended
+  CHECK(front_end->track(image, {}).empty());  // after this many dark images all tracks have ended
 }
 
-TEST_CASE("every front end finds moved tracks again") {
+TEST_CASE("every front end finds tracks again after a shift") {
   check_moves({FrontEndKind::kKlt, 0.1, 0.7, 80}, {});
   check_moves({FrontEndKind::kOrb, 1.0, 0.4, 80}, {});
   check_moves({FrontEndKind::kSift, 0.5, 0.5, 80}, {});
 }
 
-TEST_CASE("every front end drops, saves and loads alike") {
+TEST_CASE("every front end drops, saves and loads tracks consistently") {
   for (const auto kind : {FrontEndKind::kKlt, FrontEndKind::kOrb, FrontEndKind::kSift}) check_drop_and_state(kind, {});
 }
 
-TEST_CASE("superpoint runs on the weights that the user supplies") {
+TEST_CASE("superpoint runs with user-supplied weights") {
   const auto weights = superpoint_weights();
   if (weights.empty()) return;
-  check_moves({FrontEndKind::kSuperPoint, 2.5, 0.3, 10}, weights);  // few corners in a made-up texture
+  check_moves({FrontEndKind::kSuperPoint, 2.5, 0.3, 10}, weights);  // few corners in synthetic texture
 }
 
-TEST_CASE("superpoint without its weights, or with others, says so") {
+TEST_CASE("superpoint reports missing or unsuitable weights") {
   CHECK_THROWS_AS(make_front_end(config_of(FrontEndKind::kSuperPoint)), std::invalid_argument);
   const std::vector<uint8_t> junk(100, 7);
   CHECK_THROWS_AS(make_front_end(config_of(FrontEndKind::kSuperPoint), junk), std::invalid_argument);
 }
 
-TEST_CASE("descriptors of moved corners are near, of others far") {
+TEST_CASE("descriptors of shifted corners are close, of other corners distant") {
   const cv::Mat first = texture(320, 200, 11, 7), second = shifted(first, 5.0, 2.0);
   std::vector<Eigen::Vector2f> a, b;
   for (int i = 0; i < 40; ++i) {
     a.emplace_back(40.0F + 5.0F * static_cast<float>(i), 60.0F + static_cast<float>(i % 7) * 9.0F);
     b.emplace_back(a.back() + Eigen::Vector2f(5.0F, 2.0F));
   }
-  a.emplace_back(2.0F, 2.0F);  // too near to the edge
+  a.emplace_back(2.0F, 2.0F);  // too close to the edge
   const DescribedCorners da = describe_corners(first, a), db = describe_corners(second, b);
   REQUIRE(da.index.size() == 40);
   REQUIRE(db.index.size() == 40);

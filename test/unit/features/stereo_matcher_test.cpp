@@ -10,7 +10,7 @@ namespace {
 
 const CameraIntrinsics kLens{640, 240, 400.0, 400.0, 320.0, 120.0, Distortion::kNone, {}};
 
-/// Share of a fronto-parallel wall's corners whose right pixel is found within 0.25 px.
+/// Share of the corners of a fronto-parallel wall whose right pixel is found within 0.25 px.
 double matched_share(double depth_m, std::optional<double> depth_known) {
   const double baseline = 0.5;
   const double disparity = kLens.fx * baseline / depth_m;
@@ -32,7 +32,7 @@ double matched_share(double depth_m, std::optional<double> depth_known) {
   return static_cast<double>(good) / static_cast<double>(queries.size());
 }
 
-TEST_CASE("stereo finds near and far walls without knowing their depth") {
+TEST_CASE("stereo matches near and far walls without known depth") {
   CHECK(matched_share(2.5, {}) > 0.9);
   CHECK(matched_share(10.0, {}) > 0.9);
   CHECK(matched_share(300.0, {}) > 0.9);
@@ -43,7 +43,7 @@ TEST_CASE("a known depth is used, and a wrong one fails") {
   CHECK(matched_share(2.5, 50.0) < 0.2);
 }
 
-TEST_CASE("pictures without correspondence give few matches") {
+TEST_CASE("unrelated images give few matches") {
   SE3 T_right_left;
   T_right_left.p.x() = -0.5;
   const StereoMatcher matcher(Camera{kLens}, Camera{kLens}, T_right_left, {});
