@@ -9,21 +9,22 @@ namespace roadfix {
 namespace {
 
 constexpr double kFirstDamping = 1e-4;
-constexpr double kEnoughGain = 1e-5;     ///< relative
-constexpr double kHiddenCost = 100.0;    ///< of an observation whose point is not in front of its camera
-constexpr double kDistanceHuber = 5.0;   ///< sigmas beyond which a measured distance counts linearly
-constexpr double kMinSeparation = 1e-6;  ///< m; nearer views have no direction to push
+constexpr double kMinRelativeDecrease = 1e-5;  ///< relative
+constexpr double kInvisibleCost = 100.0;       ///< of an observation behind its camera
+constexpr double kDistanceHuber = 5.0;         ///< sigmas, knee of the Huber cost
+constexpr double kMinSeparation = 1e-6;        ///< m; closer views have no direction between them
 
-/// Huber's cost of a squared error, and the weight that reweighted least squares gives it.
+/// Huber's cost of a squared error and its weight in iteratively reweighted least squares.
 double robust_cost(double r2, double huber) {
   return r2 <= huber * huber ? 0.5 * r2 : huber * (std::sqrt(r2) - 0.5 * huber);
 }
 double robust_weight(double r2, double huber) { return r2 <= huber * huber ? 1.0 : huber / std::sqrt(r2); }
-/// The mean over all directions of Huber's second derivative: beyond the knee the cost is a cone, straight outwards and
-/// as curved as its weight around, (M.13a).
+/// Mean of the second derivative of Huber's cost over all directions: beyond the knee it is zero along the residual and
+/// equals the weight across it, (S.7.12).
 double robust_curvature(double r2, double huber) { return r2 <= huber * huber ? 1.0 : 0.5 * robust_weight(r2, huber); }
 
-/// What linearise() is for: steps take the weight as curvature too, which always leads downhill; a covariance must not.
+/// Purpose of linearise(): steps use the weight as curvature, which guarantees descent; a covariance needs the exact
+/// one.
 enum class Purpose { kStep, kCovariance };
 
 class Eyes {
@@ -34,12 +35,12 @@ class Eyes {
       eyes_.emplace_back(view.T_map_camera, problem.lens, problem.T_right_left);
     }
   }
-  [[nodiscard]] const Eye& of(const BundleProblem::Observation& o) const {
+  [[nodiscard]] const PosedCamera& of(const BundleProblem::Observation& o) const {
     return eyes_[static_cast<size_t>(2 * o.view + (o.right ? 1 : 0))];
   }
 
  private:
-  std::vector<Eye> eyes_;
+  std::vector<PosedCamera> eyes_;
 };
 
 Eigen::Vector3d separation(const BundleProblem& problem, const BundleProblem::Distance& d) {
@@ -47,7 +48,7 @@ Eigen::Vector3d separation(const BundleProblem& problem, const BundleProblem::Di
          problem.views[static_cast<size_t>(d.view_a)].T_map_camera.p;
 }
 
-/// One observation at the present values, in sigmas.
+/// One observation at the current estimate, normalised by sigma.
 struct Sight {
   ReprojectionJacobian J;
   Eigen::Vector2d residual;
@@ -59,9 +60,9 @@ Sight sight(const BundleProblem& problem, const Eyes& eyes, const BundleProblem:
   const double scale = problem.focal_px / problem.sigma_px;
   Sight s;
   Eigen::Vector2d seen;
-  s.visible = eyes.of(o).see(problem.points[static_cast<size_t>(o.point)], seen, &s.J);
+  s.visible = eyes.of(o).project(problem.points[static_cast<size_t>(o.point)], seen, &s.J);
   const BundleProblem::View& view = problem.views[static_cast<size_t>(o.view)];
-  if (view.fixed && s.visible) s.J.correction += s.J.pose * view.pull;
+  if (view.fixed && s.visible) s.J.correction += s.J.pose * view.lens_sensitivity;
   s.residual = scale * (o.normalised - seen);
   s.r2 = s.residual.squaredNorm();
   s.J.pose *= scale;
@@ -70,11 +71,11 @@ Sight sight(const BundleProblem& problem, const Eyes& eyes, const BundleProblem:
   return s;
 }
 
-/// What a track costs and how much it counts, (M.8b): Student's t over all its numbers.
+/// Cost and weight of a track, (S.7.2): Student's t over all its residuals.
 struct TrackCost {
   double cost = 0.0;
   double weight = 0.0;
-  double bend = 0.0;  ///< what the square of its score takes off the second derivative, (M.13b)
+  double score_curvature = 0.0;  ///< subtracted from the second derivative times the squared score, (S.7.13)
 };
 
 TrackCost track_cost(const std::vector<Sight>& sights, const BundleProblem& problem) {
@@ -82,7 +83,7 @@ TrackCost track_cost(const std::vector<Sight>& sights, const BundleProblem& prob
   double sum = 0.0, numbers = 0.0;
   for (const Sight& s : sights) {
     if (!s.visible) {
-      t.cost += kHiddenCost;
+      t.cost += kInvisibleCost;
       continue;
     }
     sum += 2.0 * robust_cost(s.r2, problem.huber);
@@ -92,17 +93,17 @@ TrackCost track_cost(const std::vector<Sight>& sights, const BundleProblem& prob
   const double freedom = problem.track_freedom;
   t.cost += 0.5 * (freedom + numbers) * std::log1p(sum / freedom);
   t.weight = (freedom + numbers) / (freedom + sum);
-  t.bend = 2.0 / (freedom + numbers);
+  t.score_curvature = 2.0 / (freedom + numbers);
   return t;
 }
 
-/// (M.8) and (M.9) at one point, which need the same reprojections.
+/// (S.7.1) and (S.7.7) in one pass, since both need the reprojections.
 struct Linearised {
   NormalEquations equations;
   double cost = 0.0;
 };
 
-/// `error_px` receives one error per observation where asked for.
+/// `error_px`: optional, one error per observation.
 Linearised linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free,
                      Purpose purpose = Purpose::kStep, std::vector<double>* error_px = nullptr) {
   Linearised result{NormalEquations(num_free, problem.points.size(), problem.observations.size())};
@@ -126,7 +127,8 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
       if (!s.visible) continue;
       const double slope = t.weight * robust_weight(s.r2, problem.huber);
       const double curvature = purpose == Purpose::kStep ? slope : t.weight * robust_curvature(s.r2, problem.huber);
-      result.equations.add(view, static_cast<size_t>(track->point), s.J, s.residual, {slope, curvature, t.bend});
+      result.equations.add(view, static_cast<size_t>(track->point), s.J, s.residual,
+                           {slope, curvature, t.score_curvature});
     }
   }
   for (const BundleProblem::Distance& d : problem.distances) {
@@ -139,12 +141,12 @@ Linearised linearise(const BundleProblem& problem, const std::vector<int>& free,
     result.equations.add_distance(free[static_cast<size_t>(d.view_a)], free[static_cast<size_t>(d.view_b)],
                                   root_weight * between / (length * d.sigma), root_weight * residual);
   }
-  for (const BundleProblem::Standing& s : problem.standings) {
+  for (const BundleProblem::Standstill& s : problem.standstills) {
     const auto earlier = static_cast<size_t>(s.view_a), later = static_cast<size_t>(s.view_b);
-    const StandingTie tie =
-        standing_tie(problem.views[earlier].T_map_camera, problem.views[later].T_map_camera, s.doubt);
-    result.cost += 0.5 * tie.missing.squaredNorm();
-    result.equations.add_tie(free[earlier], free[later], tie.J_earlier, tie.J_later, tie.missing);
+    const StandstillConstraint tie =
+        standstill_constraint(problem.views[earlier].T_map_camera, problem.views[later].T_map_camera, s.doubt);
+    result.cost += 0.5 * tie.residual.squaredNorm();
+    result.equations.add_relative_pose(free[earlier], free[later], tie.J_earlier, tie.J_later, tie.residual);
   }
   return result;
 }
@@ -154,8 +156,8 @@ void apply(const NormalEquations::Step& step, const std::vector<int>& free, Bund
     SE3& T = problem.views[v].T_map_camera;
     if (free[v] >= 0) {
       T = retract(T, step.views.segment<6>(6 * free[v]));
-    } else if (!problem.views[v].pull.isZero(0.0)) {
-      T = retract(T, problem.views[v].pull * step.lens);
+    } else if (!problem.views[v].lens_sensitivity.isZero(0.0)) {
+      T = retract(T, problem.views[v].lens_sensitivity * step.lens);
     }
   }
   for (size_t p = 0; p < step.points.size(); ++p) problem.points[p] += step.points[p];
@@ -170,25 +172,25 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
   for (const BundleProblem::View& view : problem.views) free.push_back(view.fixed ? -1 : num_free++);
 
   BundleReport report;
-  Linearised here = linearise(problem, free, num_free);
-  report.cost_before = here.cost;
+  Linearised current = linearise(problem, free, num_free);
+  report.cost_before = current.cost;
   double damping = kFirstDamping;
   while (report.iterations < max_iterations) {
     ++report.iterations;
     const auto views = problem.views;
     const auto points = problem.points;
     const LensCorrection lens = problem.lens;
-    apply(here.equations.solve(damping), free, problem);
-    Linearised there = linearise(problem, free, num_free);
-    if (!(there.cost < here.cost)) {  // also when it is not a number
+    apply(current.equations.solve(damping), free, problem);
+    Linearised candidate = linearise(problem, free, num_free);
+    if (!(candidate.cost < current.cost)) {  // also when it is NaN
       problem.views = views;
       problem.points = points;
       problem.lens = lens;
       damping *= 10.0;
       continue;
     }
-    const bool enough = here.cost - there.cost < kEnoughGain * here.cost;
-    here = std::move(there);
+    const bool enough = current.cost - candidate.cost < kMinRelativeDecrease * current.cost;
+    current = std::move(candidate);
     damping = std::max(1e-9, 0.1 * damping);
     if (enough) break;
   }
@@ -204,9 +206,9 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
   report.lens_cov = cov.bottomRightCorner<LensCorrection::kSize, LensCorrection::kSize>();
   const LensCorrection::Matrix lens_information = report.lens_cov.inverse();
   for (size_t v = 0; v < problem.views.size(); ++v) {
-    report.pulls.push_back(free[v] < 0
-                               ? problem.views[v].pull
-                               : cov.block<6, LensCorrection::kSize>(6 * free[v], 6 * num_free) * lens_information);
+    report.lens_sensitivities.push_back(free[v] < 0 ? problem.views[v].lens_sensitivity
+                                                    : cov.block<6, LensCorrection::kSize>(6 * free[v], 6 * num_free) *
+                                                          lens_information);
   }
   return report;
 }

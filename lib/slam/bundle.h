@@ -1,62 +1,61 @@
-/// Local bundle adjustment: camera poses, points and what the calibration has wrong, so that every picture's sightings
-/// fit best. Levenberg and Marquardt's method on the reduced camera system (Triggs et al., Bundle Adjustment, 2000,
-/// section 6). MODEL.md (M.8)-(M.13).
+/// Local bundle adjustment of camera poses, points and calibration correction: Levenberg-Marquardt on the reduced
+/// camera system (Triggs et al., Bundle Adjustment, 2000, section 6). MODEL.md (S.7.1)-(S.7.11).
 ///
-/// Written out here instead of handed to Ceres because the reduced system's inverse is the covariance that we publish
-/// (its cost against Ceres was not measured); a test solves the same problem with Ceres and compares.
+/// Not Ceres, because the inverse of the reduced system is the published covariance (cost against Ceres not measured);
+/// a test solves the same problem with Ceres and compares.
 #pragma once
 
 #include <vector>
 
 #include "slam/reprojection.h"
-#include "slam/standing.h"
+#include "slam/standstill_constraint.h"
 
 namespace roadfix {
 
-/// How a pose moves, by retract(), where the lens is found to be another.
-using LensPull = Eigen::Matrix<double, 6, LensCorrection::kSize>;
+/// Derivative of a pose, by retract(), with respect to the calibration correction.
+using LensSensitivity = Eigen::Matrix<double, 6, LensCorrection::kSize>;
 
 struct BundleProblem {
   struct View {
     SE3 T_map_camera;
-    bool fixed = false;                ///< but for what it moves with the lens
-    LensPull pull = LensPull::Zero();  ///< of a fixed view, (M.13c)
+    bool fixed = false;                                          ///< except for its dependence on the lens correction
+    LensSensitivity lens_sensitivity = LensSensitivity::Zero();  ///< of a fixed view, (S.7.14)
   };
   struct Observation {
     int view = 0;
     int point = 0;
-    bool right = false;  ///< seen by the right eye
+    bool right = false;  ///< observed by the right camera
     Eigen::Vector2d normalised;
   };
-  /// Metres between two views, from wheels or to fix the scale of a start.
+  /// Measured distance between two views, m, or the reference length of an initialisation.
   struct Distance {
     int view_a = 0;
     int view_b = 0;
     double distance = 0.0;
     double sigma = 0.0;
-    bool measured = false;  ///< and may be far off, as a wheel slips: counts linearly beyond five sigmas
+    bool measured = false;  ///< by speeds; linear cost beyond five sigmas (wheel slip)
   };
 
-  /// Two views of a car that stands: the later one is where the earlier one is, (M.8d).
-  struct Standing {
+  /// Two views at a standstill: the same pose, (S.7.6).
+  struct Standstill {
     int view_a = 0;
     int view_b = 0;
-    StandingDoubt doubt;
+    StandstillSigma doubt;
   };
 
   std::vector<View> views;
   std::vector<Eigen::Vector3d> points;
   std::vector<Observation> observations;  ///< ascending by point, then view, left before right
   std::vector<Distance> distances;
-  std::vector<Standing> standings;
+  std::vector<Standstill> standstills;
   SE3 T_right_left;     ///< as calibrated
-  LensCorrection lens;  ///< what it is found to be
+  LensCorrection lens;  ///< estimate
   LensCorrection lens_prior;
   LensCorrection::Matrix lens_information = LensCorrection::Matrix::Identity();  ///< of the prior
   double focal_px = 0.0;
   double sigma_px = 0.5;
-  double huber = 2.0;          ///< sigmas beyond which an error counts linearly
-  double track_freedom = 3.0;  ///< of Student's t over a track; infinite would be one sigma for all
+  double huber = 2.0;          ///< sigmas, knee of the Huber cost
+  double track_freedom = 3.0;  ///< degrees of freedom of Student's t over a track; infinite: one sigma for all
 };
 
 struct BundleReport {
@@ -64,13 +63,14 @@ struct BundleReport {
   double cost_after = 0.0;
   int iterations = 0;
   std::vector<double> error_px;          ///< one per observation, after; infinite where the point is not in front
-  Matrix6d cov_last = Matrix6d::Zero();  ///< of the last view against the fixed ones, every error on its own
-  Matrix6d clustered_cov_last = Matrix6d::Zero();  ///< the same for errors that are alike along a track, (M.16)
-  std::vector<LensPull> pulls;                     ///< one per view, against the fixed ones
+  Matrix6d cov_last = Matrix6d::Zero();  ///< of the last view relative to the fixed ones, for independent errors
+  Matrix6d clustered_cov_last = Matrix6d::Zero();   ///< the same for errors correlated along a track, (S.9.2)
+  std::vector<LensSensitivity> lens_sensitivities;  ///< one per view, relative to the fixed ones
   LensCorrection::Matrix lens_cov = LensCorrection::Matrix::Zero();
 };
 
-/// Moves views, points and lens; at most `max_iterations` steps, fewer once a step gains less than 1e-5 of the cost.
+/// Adjusts views, points and lens; at most `max_iterations` steps, fewer once a step reduces the cost by less than
+/// 1e-5.
 BundleReport adjust(BundleProblem& problem, int max_iterations);
 
 }  // namespace roadfix

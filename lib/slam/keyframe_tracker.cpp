@@ -13,18 +13,18 @@
 namespace roadfix {
 namespace {
 
-constexpr double kUnknownSpeed = 30.0;  ///< m/s, standard deviation where there is a pose but no motion yet
+constexpr double kUnknownSpeedStd = 30.0;  ///< m/s, with a pose but no motion yet
 
-constexpr double kBraking = 4.0;       ///< m/s2, firm
-constexpr double kBump = 0.2;          ///< rad, by which a car is thrown off its motion at once
-constexpr double kFastestTurn = 3.0;   ///< rad/s, more than a car turns or stops turning by
-constexpr double kSeenSpeedStd = 0.2;  ///< m/s, of a speed from two pictures
+constexpr double kBraking = 4.0;          ///< m/s2, firm braking
+constexpr double kMaxRotationJump = 0.2;  ///< rad, instantaneous deviation from the predicted motion
+constexpr double kMaxRotationRate = 3.0;  ///< rad/s, limit of the change of rotation
+constexpr double kVisualSpeedStd = 0.2;   ///< m/s, of a speed from two images
 
-/// The motion `T` stretched in time by `factor`.
-SE3 stretched(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
+/// The motion `T` scaled in time by `factor`.
+SE3 scaled_motion(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
 
-/// Places of descriptors are coarser than optical flow's: pixels of a pyramid level, cells of a network.
-double noise_of(const FrontEndConfig& front_end) {
+/// Pixel noise relative to optical flow: descriptor keypoints are localised on pyramid levels or network cells.
+double front_end_noise(const FrontEndConfig& front_end) {
   switch (front_end.kind) {
     case FrontEndKind::kOrb:
       return 2.0;
@@ -38,16 +38,16 @@ double noise_of(const FrontEndConfig& front_end) {
   return 1.0;
 }
 
-/// The configuration with its pixel noise as this front end has it.
-KeyframeTrackerConfig fitted(KeyframeTrackerConfig config) {
-  const double noise = noise_of(config.front_end);
+/// Adapts the pixel noise to the front end.
+KeyframeTrackerConfig with_front_end_noise(KeyframeTrackerConfig config) {
+  const double noise = front_end_noise(config.front_end);
   config.sigma_px *= noise;
   config.gate_px *= noise;
   return config;
 }
 
 LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRig& rig) {
-  // Corners at whole pixels, seen from another place.
+  // Corners at integer pixels, from another viewpoint.
   constexpr double kSigma_px = 1.0, kGate_px = 4.0;
   LoopCloserConfig loops;
   loops.pose.focal_px = Camera(rig.left).focal();
@@ -63,7 +63,7 @@ LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRi
 KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig,
                                  std::unique_ptr<FrontEnd> front_end, Executor& executor,
                                  std::unique_ptr<RightImageMatcher> right_matcher)
-    : config_(fitted(config)),
+    : config_(with_front_end_noise(config)),
       rig_(rig),
       left_(rig.left),
       front_end_(std::move(front_end)),
@@ -83,7 +83,7 @@ KeyframeTracker::~KeyframeTracker() { executor_.wait(); }
 const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   if (t_us_ && frame.t_us <= *t_us_) return out_;
   finish_bundle();
-  take_speeds();
+  add_speeds();
   TrackedFrame fresh;
   fresh.reset_counter = out_.reset_counter;
   fresh.reset_delta = out_.reset_delta;
@@ -91,29 +91,29 @@ const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
   fresh.closed_reset_delta = out_.closed_reset_delta;
   fresh.odometry.t_us = frame.t_us;
   out_ = std::move(fresh);
-  take_level();
-  if (restarted_) arrive(frame.t_us);
-  if (const std::string reason = unusable(frame); !reason.empty()) {
-    miss(frame.t_us, reason);
+  apply_levelling();
+  if (restarted_) apply_restart(frame.t_us);
+  if (const std::string reason = rejection_reason(frame); !reason.empty()) {
+    coast_or_lose(frame.t_us, reason);
   } else if (map_.empty()) {
     start(frame);
   } else {
-    take_scale();
-    follow(frame);
-    if (map_.empty()) start_after(std::string(out_.reason), frame);
+    initialise_scale();
+    track_frame(frame);
+    if (map_.empty()) restart_after_loss(std::string(out_.reason), frame);
   }
   t_us_ = frame.t_us;
   out_.scale = stereo_ ? ScaleSource::kStereo : scale_;
-  out_.scale_std = shared_doubt().lengths;
+  out_.scale_std = scale_sigmas().length;
   out_.num_keyframes = map_.num_keyframes_ever();
   out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
   out_.num_loops = loops_.num_loops();
   return out_;
 }
 
-std::string KeyframeTracker::unusable(const CameraFrame& frame) {
-  const auto fits = [](const cv::Mat& picture, const CameraIntrinsics& lens) {
-    return picture.type() == CV_8UC1 && picture.cols == lens.width && picture.rows == lens.height;
+std::string KeyframeTracker::rejection_reason(const CameraFrame& frame) {
+  const auto fits = [](const cv::Mat& image, const CameraIntrinsics& lens) {
+    return image.type() == CV_8UC1 && image.cols == lens.width && image.rows == lens.height;
   };
   if (frame.left.empty()) return "the picture cannot be read";
   if (!fits(frame.left, rig_.left)) return "the picture does not have the size of the calibration";
@@ -127,36 +127,38 @@ std::string KeyframeTracker::unusable(const CameraFrame& frame) {
 
 SE3 KeyframeTracker::predict(int64_t t_us) const {
   if (!motion_ || !t_us_ || motion_->dt_s <= 0.0) return T_map_camera_;
-  return T_map_camera_ * stretched(motion_->T_before_now, seconds_between(*t_us_, t_us) / motion_->dt_s);
+  return T_map_camera_ * scaled_motion(motion_->T_before_now, seconds_between(*t_us_, t_us) / motion_->dt_s);
 }
 
-void KeyframeTracker::follow(const CameraFrame& frame) {
+void KeyframeTracker::track_frame(const CameraFrame& frame) {
   const SE3 T_predicted = predict(frame.t_us);
-  const std::vector<Feature> features = front_end_->track(frame.left, hints(T_predicted));
+  const std::vector<Feature> features = front_end_->track(frame.left, predicted_features(T_predicted));
   pixels_.clear();
   for (const Feature& f : features) pixels_[f.track] = f.pixel;
   out_.num_expected = front_end_->num_expected();
   out_.num_matches = static_cast<int>(features.size());
   if (!solve(features, T_predicted)) {
-    if (!hold(frame, features) && !pull_away(frame, features)) miss(frame.t_us, "too few landmarks agree on a pose");
+    if (!hold_at_standstill(frame, features) && !track_bearing_only(frame, features))
+      coast_or_lose(frame.t_us, "too few landmarks agree on a pose");
     return;
   }
-  drop_wrong_tracks(features);
-  learn_found_share();
+  drop_outlier_tracks(features);
+  update_redetection_rate();
   if (needs_keyframe(features)) make_keyframe(frame, features);
 }
 
-/// Few wrong landmarks agree on a car that lies on its side. What is expected errs by no more than this.
-bool KeyframeTracker::can_turn(const Eigen::Quaterniond& q_expected, const Eigen::Quaterniond& q_found) const {
+/// A few wrong landmarks can agree on an impossible rotation; the prediction error is limited.
+bool KeyframeTracker::rotation_plausible(const Eigen::Quaterniond& q_expected,
+                                         const Eigen::Quaterniond& q_found) const {
   const double unseen_s = t_good_us_ ? seconds_between(*t_good_us_, out_.odometry.t_us) : 0.0;
-  return log_q(q_expected.conjugate() * q_found).norm() < kBump + kFastestTurn * unseen_s;
+  return log_q(q_expected.conjugate() * q_found).norm() < kMaxRotationJump + kMaxRotationRate * unseen_s;
 }
 
 bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_predicted) {
   std::vector<PosePoint> points;
   std::vector<size_t> index;
   for (size_t i = 0; i < features.size(); ++i) {
-    out_.features.push_back({features[i], FeatureUse::kMatched});
+    out_.features.push_back({features[i], FeatureStatus::kMatched});
     const Landmark* landmark = map_.find(features[i].track);
     const auto normalised = left_.unproject(features[i].pixel.cast<double>());
     if (landmark == nullptr || !landmark->p_map || !normalised) continue;
@@ -170,9 +172,9 @@ bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_p
     auto found = search_pose(points, config);
     if (found && (!solution || found->num_inliers > solution->num_inliers)) solution = std::move(found);
   }
-  if (!solution || !can_turn(T_predicted.q, solution->T_map_camera.q)) return false;
+  if (!solution || !rotation_plausible(T_predicted.q, solution->T_map_camera.q)) return false;
   for (size_t k = 0; k < index.size(); ++k) {
-    out_.features[index[k]].use = solution->inlier[k] ? FeatureUse::kInlier : FeatureUse::kOutlier;
+    out_.features[index[k]].status = solution->inlier[k] ? FeatureStatus::kInlier : FeatureStatus::kOutlier;
   }
   out_.num_inliers = solution->num_inliers;
   out_.rms_px = solution->rms_px;
@@ -180,88 +182,88 @@ bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_p
                     solution->num_inliers < config_.weak_ratio * static_cast<double>(points.size());
   out_.state = weak ? TrackState::kWeak : TrackState::kGood;
   if (weak) out_.reason = "few landmarks agree with the pose";
-  accept(out_.odometry.t_us, solution->T_map_camera, solution->cov);
+  accept_pose(out_.odometry.t_us, solution->T_map_camera, solution->cov);
   return true;
 }
 
-void KeyframeTracker::accept(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera) {
+void KeyframeTracker::accept_pose(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera) {
   if (t_us_) motion_ = FrameMotion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
-  settle(t_us, T_map_camera, cov_camera, 2.0 * cov_camera);
+  set_pose(t_us, T_map_camera, cov_camera, 2.0 * cov_camera);
 }
 
-/// With the motion that is already known, its covariance that of motion_.T_before_now, position in the map.
-void KeyframeTracker::settle(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera,
-                             const Matrix6d& cov_motion) {
+/// Sets the pose with motion_ already known; cov_motion: of motion_.T_before_now, position in the map.
+void KeyframeTracker::set_pose(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera,
+                               const Matrix6d& cov_motion) {
   T_map_camera_ = T_map_camera;
   t_good_us_ = t_us;
-  note_attitude(t_us);
-  tell_pose(T_map_camera, cov_camera);
+  record_attitude(t_us);
+  set_output_pose(T_map_camera, cov_camera);
   Odometry& o = out_.odometry;
   o.validity = Validity::kValid;
-  o.cov_velocity = kUnknownSpeed * kUnknownSpeed * Eigen::Matrix3d::Identity();
+  o.cov_velocity = kUnknownSpeedStd * kUnknownSpeedStd * Eigen::Matrix3d::Identity();
   if (motion_ && motion_->dt_s > 0.0) {
-    const Matrix6d cov_vehicle = carried(cov_motion, T_map_camera, rig_.T_vehicle_left.inverse());
+    const Matrix6d cov_vehicle = transported(cov_motion, T_map_camera, rig_.T_vehicle_left.inverse());
     const Eigen::Matrix3d R = o.T_frame_vehicle.R();
-    tell_motion(R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s));
+    set_output_motion(R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s));
   }
 }
 
-/// What lengths and turns are known to, all along the way. One eye learns its focal length, (M.15).
-SharedDoubt KeyframeTracker::shared_doubt() const {
-  if (stereo_ && !map_.one_eyed()) return rig_.doubt;
+/// Sigmas of the common scales. Monocular: the estimated focal length, (S.8.1).
+ScaleSigmas KeyframeTracker::scale_sigmas() const {
+  if (stereo_ && !map_.right_camera_lost()) return rig_.scale_sigmas;
   const double turns = map_.focal_std();
-  if (stereo_) return {std::max(rig_.doubt.lengths, scale_std_), std::max(rig_.doubt.turns, turns)};
+  if (stereo_) return {std::max(rig_.scale_sigmas.length, scale_std_), std::max(rig_.scale_sigmas.rotation, turns)};
   return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, turns};
 }
 
-/// A pose and its covariances: what the map knows, carried here, what this picture adds, `cov_camera`, and what the
-/// whole way shares.
-void KeyframeTracker::tell_pose(const SE3& T_map_camera, const Matrix6d& cov_camera) {
+/// Output pose and covariances: transported map covariance, `cov_camera` of this image, and the common scales.
+void KeyframeTracker::set_output_pose(const SE3& T_map_camera, const Matrix6d& cov_camera) {
   const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
-  const SharedDoubt doubt = shared_doubt();
+  const ScaleSigmas sigmas = scale_sigmas();
   const bool metres = stereo_ || scale_ != ScaleSource::kNone;
   const Eigen::Vector3d lever = metres ? Eigen::Vector3d::Zero() : T_camera_vehicle.p;
-  shared_.go_to(T_map_camera, doubt, lever);
-  const Matrix6d cov = carried(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
+  considered_.propagate_to(T_map_camera, sigmas, lever);
+  const Matrix6d cov = transported(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
   out_.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle;
-  out_.odometry.cov_pose = carried(cov + shared_.cov(), T_map_camera, T_camera_vehicle);
-  out_.shared_error = carried_by(T_map_camera, T_camera_vehicle) * shared_.columns();
-  out_.cov_picture = carried(cov_camera, T_map_camera, T_camera_vehicle);
-  out_.cov_map = carried(cov_window_, map_.last().T_map_camera, T_keyframe_now * T_camera_vehicle);
-  out_.map_time = seconds_between(map_.held_us(), out_.odometry.t_us);
+  out_.odometry.cov_pose = transported(cov + considered_.cov(), T_map_camera, T_camera_vehicle);
+  out_.scale_sensitivity = pose_transport_jacobian(T_map_camera, T_camera_vehicle) * considered_.columns();
+  out_.cov_image = transported(cov_camera, T_map_camera, T_camera_vehicle);
+  out_.cov_map = transported(cov_window_, map_.last().T_map_camera, T_keyframe_now * T_camera_vehicle);
+  out_.map_time = seconds_between(map_.last_fixed_us(), out_.odometry.t_us);
   const Sim3& S_map_odom = loops_.S_map_odom();
   const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
   const SE3 T_closed_camera = (S_map_odom * Sim3{T_map_camera.q, T_map_camera.p, 1.0}).rigid();
-  shared_closed_.go_to(T_closed_camera, doubt, lever);
-  const Matrix6d cov_closed = carried(cov_closed_, T_closed_keyframe, T_keyframe_now) + in_map(cov_camera, S_map_odom);
-  out_.cov_closed = carried(cov_closed + shared_closed_.cov(), T_closed_camera, T_camera_vehicle);
+  considered_closed_.propagate_to(T_closed_camera, sigmas, lever);
+  const Matrix6d cov_closed =
+      transported(cov_closed_, T_closed_keyframe, T_keyframe_now) + rotated(cov_camera, S_map_odom);
+  out_.cov_closed = transported(cov_closed + considered_closed_.cov(), T_closed_camera, T_camera_vehicle);
 }
 
-/// The last motion as velocities; their covariance without what all lengths share.
-void KeyframeTracker::tell_motion(const Eigen::Matrix3d& cov_velocity) {
+/// Velocities from the last motion; covariance without the common length scale.
+void KeyframeTracker::set_output_motion(const Eigen::Matrix3d& cov_velocity) {
   const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * rig_.T_vehicle_left.inverse();
   Odometry& o = out_.odometry;
   o.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
   o.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
-  const Eigen::Vector3d shared = shared_doubt().lengths * o.velocity;
+  const Eigen::Vector3d shared = scale_sigmas().length * o.velocity;
   o.cov_velocity = cov_velocity + shared * shared.transpose();
 }
 
-void KeyframeTracker::drop_wrong_tracks(const std::vector<Feature>& features) {
+void KeyframeTracker::drop_outlier_tracks(const std::vector<Feature>& features) {
   std::vector<int64_t> wrong;
   for (size_t i = 0; i < features.size(); ++i) {
-    if (out_.features[i].use == FeatureUse::kOutlier) wrong.push_back(features[i].track);
+    if (out_.features[i].status == FeatureStatus::kOutlier) wrong.push_back(features[i].track);
   }
   front_end_->drop(wrong);
   map_.forget(wrong);
   for (const int64_t track : wrong) pixels_.erase(track);
 }
 
-void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
+void KeyframeTracker::coast_or_lose(int64_t t_us, const std::string& reason) {
   out_.reason = reason;
   if (map_.empty()) {
-    out_.state = without_map(t_us, false);
+    out_.state = state_without_map(t_us, false);
     return;
   }
   const SE3 T_predicted = predict(t_us);
@@ -269,13 +271,13 @@ void KeyframeTracker::miss(int64_t t_us, const std::string& reason) {
   T_map_camera_ = T_predicted;
   if (without_s < config_.lost_after_s) {
     out_.state = TrackState::kWeak;
-    tell_pose(T_predicted, Matrix6d::Identity() * (without_s * without_s));
+    set_output_pose(T_predicted, Matrix6d::Identity() * (without_s * without_s));
     out_.odometry.validity = Validity::kCoasting;
-    // By the motion of before, from which a braking car departs.
-    const bool going = motion_ && motion_->dt_s > 0.0;
-    const double sigma = going ? kSeenSpeedStd + kBraking * without_s : kUnknownSpeed;
+    // From the last motion; a braking car departs from it.
+    const bool moving = motion_ && motion_->dt_s > 0.0;
+    const double sigma = moving ? kVisualSpeedStd + kBraking * without_s : kUnknownSpeedStd;
     out_.odometry.cov_velocity = sigma * sigma * Eigen::Matrix3d::Identity();
-    if (going) tell_motion(Eigen::Matrix3d(out_.odometry.cov_velocity));
+    if (moving) set_output_motion(Eigen::Matrix3d(out_.odometry.cov_velocity));
     return;
   }
   out_.state = TrackState::kLost;

@@ -12,15 +12,17 @@
 namespace roadfix {
 namespace {
 
-constexpr double kNoLoss = 0.99;  ///< share of what is known of the lens that a window may not take away
-constexpr int64_t kBlink = 3;     ///< keyframes without the right eye that are no loss of it
+constexpr double kMinRetainedInformation = 0.99;  ///< of the lens information, for a window to be accepted
+constexpr int64_t kMinMissing = 3;  ///< keyframes without a right image before the rig counts as monocular
 
-/// Of the calibration before any picture. Two eyes tell depth by disparity, which every error of a lens resembles:
-/// there only the right eye's turn is learnt.
-LensCorrection::Matrix first_information(const KeyframeTrackerConfig& config, bool two_eyes) {
-  const auto information = [&](double sigma) { return config.alike_sightings / std::max(1e-12, sigma * sigma); };
+/// Prior of the calibration correction. In stereo, depth comes from disparity and focal length or distortion are not
+/// separable from it: only the rotation of the right camera is estimated.
+LensCorrection::Matrix prior_information(const KeyframeTrackerConfig& config, bool stereo) {
+  const auto information = [&](double sigma) {
+    return config.correlated_observations / std::max(1e-12, sigma * sigma);
+  };
   LensCorrection::Vector diagonal;
-  diagonal << information(two_eyes ? 0.0 : config.focal_std), information(two_eyes ? 0.0 : config.radial_std),
+  diagonal << information(stereo ? 0.0 : config.focal_std), information(stereo ? 0.0 : config.radial_std),
       Eigen::Vector3d::Constant(information(config.right_turn_std_deg * kDegree));
   return diagonal.asDiagonal();
 }
@@ -31,30 +33,30 @@ LocalMap::LocalMap(const CameraRig& rig, const KeyframeTrackerConfig& config)
     : rig_(rig),
       config_(config),
       focal_px_(Camera(rig.left).focal()),
-      lens_information_(first_information(config, rig.right.has_value())) {}
+      lens_information_(prior_information(config, rig.right.has_value())) {}
 
-/// Whoever has lost an eye is like mono: what turns tell of the lens counts, else they stretch the map. With both
-/// eyes the lens is what the calibration says, again.
-void LocalMap::count_eyes(std::span<const KeyframeFeature> features) {
+/// Without its right camera a rig is treated as monocular: focal length and distortion are estimated, else they distort
+/// the map. With both cameras they are as calibrated again.
+void LocalMap::update_right_camera(std::span<const KeyframeFeature> features) {
   if (!rig_.right) return;
   const bool seen = std::any_of(features.begin(), features.end(), [](const auto& f) { return f.right.has_value(); });
-  without_right_ = seen ? 0 : without_right_ + 1;
-  if (one_eyed_ == (without_right_ >= kBlink)) return;
-  one_eyed_ = !one_eyed_;
-  constexpr int kLens = 2;  // focal length and radial distortion, the vector's first
+  keyframes_without_right_ = seen ? 0 : keyframes_without_right_ + 1;
+  if (right_camera_lost_ == (keyframes_without_right_ >= kMinMissing)) return;
+  right_camera_lost_ = !right_camera_lost_;
+  constexpr int kLens = 2;  // focal length and radial distortion, the first components
   lens_information_.topRows<kLens>().setZero();
   lens_information_.leftCols<kLens>().setZero();
   lens_information_.topLeftCorner<kLens, kLens>() =
-      first_information(config_, !one_eyed_).topLeftCorner<kLens, kLens>();
+      prior_information(config_, !right_camera_lost_).topLeftCorner<kLens, kLens>();
   lens_prior_.value.head<kLens>().setZero();
 }
 
 int64_t LocalMap::add_keyframe(const Keyframe& keyframe, std::span<const KeyframeFeature> features) {
   keyframes_.push_back(keyframe);
   keyframes_.back().id = next_id_;
-  count_eyes(features);
+  update_right_camera(features);
   for (const KeyframeFeature& f : features) {
-    landmarks_[f.track].sightings.push_back({next_id_, f.left, f.right});
+    landmarks_[f.track].observations.push_back({next_id_, f.left, f.right});
   }
   forget_old_keyframes();
   make_points();
@@ -66,11 +68,11 @@ void LocalMap::forget_old_keyframes() {
   while (keyframes_.size() > keep) keyframes_.pop_front();
   const int64_t oldest = keyframes_.front().id, newest = keyframes_.back().id;
   for (auto it = landmarks_.begin(); it != landmarks_.end();) {
-    std::vector<Sighting>& sightings = it->second.sightings;
-    std::erase_if(sightings, [&](const Sighting& s) { return s.keyframe < oldest; });
-    // A track that the newest keyframe does not see has ended: without a point it will never get one.
-    const bool ended = sightings.empty() || sightings.back().keyframe != newest;
-    it = sightings.empty() || (ended && !it->second.p_map) ? landmarks_.erase(it) : std::next(it);
+    std::vector<LandmarkObservation>& observations = it->second.observations;
+    std::erase_if(observations, [&](const LandmarkObservation& s) { return s.keyframe < oldest; });
+    // A track not observed by the newest keyframe has ended: without a point it will not get one.
+    const bool ended = observations.empty() || observations.back().keyframe != newest;
+    it = observations.empty() || (ended && !it->second.p_map) ? landmarks_.erase(it) : std::next(it);
   }
 }
 
@@ -88,27 +90,27 @@ const Landmark* LocalMap::find(int64_t track) const {
 double LocalMap::worst_error_px(const Landmark& landmark, const Eigen::Vector3d& p_map) const {
   double worst = 0.0;
   Eigen::Vector2d seen;
-  const auto judge = [&](const Eye& eye, const Eigen::Vector2d& where) {
-    const bool visible = eye.see(p_map, seen);
+  const auto check = [&](const PosedCamera& eye, const Eigen::Vector2d& where) {
+    const bool visible = eye.project(p_map, seen);
     worst = std::max(worst, visible ? focal_px_ * (seen - where).norm() : 1e9);
   };
-  for (const Sighting& s : landmark.sightings) {
+  for (const LandmarkObservation& s : landmark.observations) {
     const SE3& T_map_camera = keyframe(s.keyframe)->T_map_camera;
-    judge(Eye(T_map_camera, lens_), s.left);
-    if (s.right) judge(Eye(T_map_camera, lens_, rig_.T_right_left), *s.right);
+    check(PosedCamera(T_map_camera, lens_), s.left);
+    if (s.right) check(PosedCamera(T_map_camera, lens_, rig_.T_right_left), *s.right);
   }
   return worst;
 }
 
 std::optional<Eigen::Vector3d> LocalMap::locate(const Landmark& landmark) const {
   std::vector<Ray> rays;
-  const SE3 T_left_right = lens_.turned(rig_.T_right_left).inverse();
-  for (const Sighting& s : landmark.sightings) {
+  const SE3 T_left_right = lens_.corrected_extrinsics(rig_.T_right_left).inverse();
+  for (const LandmarkObservation& s : landmark.observations) {
     const SE3& T_map_camera = keyframe(s.keyframe)->T_map_camera;
-    rays.push_back(ray(T_map_camera, lens_.straighten(s.left)));
-    if (s.right) rays.push_back(ray(T_map_camera * T_left_right, lens_.straighten(*s.right)));
+    rays.push_back(ray(T_map_camera, lens_.remove(s.left)));
+    if (s.right) rays.push_back(ray(T_map_camera * T_left_right, lens_.remove(*s.right)));
   }
-  const bool stereo = landmark.sightings.back().right.has_value();
+  const bool stereo = landmark.observations.back().right.has_value();
   const double angle = stereo ? config_.min_disparity_px / focal_px_ : config_.min_parallax_deg * kDegree;
   auto p = triangulate(rays, angle);
   if (!p || worst_error_px(landmark, *p) > config_.gate_px) return std::nullopt;
@@ -126,18 +128,20 @@ size_t LocalMap::num_fixed() const {
   return keyframes_.size() > window + 1 ? keyframes_.size() - window : 1;
 }
 
-/// What is held was adjusted with the lens of then, and moves with it: all but the newest view held. And a sighting is
-/// in as many windows as there are keyframes: beside all of them what is known must not drown. (M.13c), (M.15).
-void LocalMap::free_lens(BundleProblem& problem, size_t fixed) const {
+/// Fixed views were adjusted with an earlier lens and move with it, except the newest one. An observation is part of as
+/// many windows as there are keyframes: the prior is weighted accordingly. (S.7.14), (S.8.1).
+void LocalMap::link_fixed_views_to_lens(BundleProblem& problem, size_t fixed) const {
   const Keyframe& newest = keyframes_[fixed - 1];
   for (size_t i = 0; i < fixed; ++i) {
     const SE3 T_newest_held = newest.T_map_camera.inverse() * keyframes_[i].T_map_camera;
-    problem.views[i].pull = keyframes_[i].pull - carried_by(newest.T_map_camera, T_newest_held) * newest.pull;
+    problem.views[i].lens_sensitivity =
+        keyframes_[i].lens_sensitivity -
+        pose_transport_jacobian(newest.T_map_camera, T_newest_held) * newest.lens_sensitivity;
   }
   problem.lens_information *= static_cast<double>(keyframes_.size());
 }
 
-BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
+BundleJob LocalMap::make_bundle(const DistanceBetween& travel) const {
   BundleJob job;
   BundleProblem& problem = job.problem;
   problem.T_right_left = rig_.T_right_left;
@@ -148,33 +152,33 @@ BundleJob LocalMap::make_bundle(const TravelBetween& travel) const {
   problem.lens_prior = lens_prior_;
   problem.lens_information = lens_information_;
   const size_t fixed = num_fixed();
-  constexpr double kUnitHold = 1e-3;  // of the distance held: it is exact by definition
+  constexpr double kUnitSigma = 1e-3;  // of the reference distance, which is exact by definition
   for (size_t i = 0; i < keyframes_.size(); ++i) {
     const Keyframe& k = keyframes_[i];
     problem.views.push_back({k.T_map_camera, i < fixed});
     job.keyframes.push_back(k.id);
     if (i == 0) continue;
     const int view = static_cast<int>(i);
-    if (k.stood) problem.standings.push_back({view - 1, view, *k.stood});
+    if (k.standstill) problem.standstills.push_back({view - 1, view, *k.standstill});
     if (const auto way = travel(keyframes_[i - 1], k)) {
-      problem.distances.push_back({view - 1, view, way->distance, std::max(kMinTravelSigma, way->sigma), true});
-    } else if (k.held_distance) {
-      problem.distances.push_back({view - 1, view, *k.held_distance, kUnitHold * *k.held_distance});
+      problem.distances.push_back({view - 1, view, way->distance, std::max(kMinDistanceSigma, way->sigma), true});
+    } else if (k.reference_distance) {
+      problem.distances.push_back({view - 1, view, *k.reference_distance, kUnitSigma * *k.reference_distance});
     }
   }
-  const bool two_eyes = rig_.right && !one_eyed_;
+  const bool stereo = rig_.right && !right_camera_lost_;
   const bool measured = std::any_of(problem.distances.begin(), problem.distances.end(),
                                     [](const BundleProblem::Distance& d) { return d.measured; });
-  if (!two_eyes && measured) free_lens(problem, fixed);
+  if (!stereo && measured) link_fixed_views_to_lens(problem, fixed);
   const int64_t first = keyframes_.front().id, first_free = first + static_cast<int64_t>(fixed);
   for (const auto& [track, landmark] : landmarks_) {
-    const std::vector<Sighting>& seen = landmark.sightings;
+    const std::vector<LandmarkObservation>& seen = landmark.observations;
     const bool several = seen.size() >= 2 || (seen.size() == 1 && seen.front().right);
     if (!landmark.p_map || !several || seen.back().keyframe < first_free) continue;
     const int point = static_cast<int>(problem.points.size());
     problem.points.push_back(*landmark.p_map);
     job.tracks.push_back(track);
-    for (const Sighting& s : seen) {
+    for (const LandmarkObservation& s : seen) {
       const int view = static_cast<int>(s.keyframe - first);
       problem.observations.push_back({view, point, false, s.left});
       if (s.right) problem.observations.push_back({view, point, true, *s.right});
@@ -188,14 +192,14 @@ std::vector<int64_t> LocalMap::apply(const BundleJob& job) {
     for (Keyframe& k : keyframes_) {
       if (k.id != job.keyframes[i]) continue;
       k.T_map_camera = job.problem.views[i].T_map_camera;
-      k.pull = job.report.pulls[i];
+      k.lens_sensitivity = job.report.lens_sensitivities[i];
     }
   }
   for (size_t i = 0; i < job.tracks.size(); ++i) {
     const auto it = landmarks_.find(job.tracks[i]);
     if (it != landmarks_.end()) it->second.p_map = job.problem.points[i];
   }
-  learn_lens(job);
+  update_lens(job);
   std::vector<int64_t> wrong;
   for (size_t i = 0; i < job.report.error_px.size(); ++i) {
     if (job.report.error_px[i] <= config_.gate_px) continue;
@@ -207,21 +211,22 @@ std::vector<int64_t> LocalMap::apply(const BundleJob& job) {
   return wrong;
 }
 
-void LocalMap::learn_lens(const BundleJob& job) {
+void LocalMap::update_lens(const BundleJob& job) {
   lens_ = lens_prior_ = job.problem.lens;
-  // What this window added. The next windows share most of it: each counts for its share only, (M.15).
+  // Information gained from this window, which overlaps the next ones: only its share counts, (S.8.1).
   const double share = 1.0 / static_cast<double>(job.keyframes.size());
-  const LensCorrection::Matrix told = job.report.lens_cov.inverse() - job.problem.lens_information;
-  const LensCorrection::Matrix added = share * 0.5 * (told + told.transpose());
-  // Where a window has not come to its minimum its curvature may be none, and it tells nothing.
+  const LensCorrection::Matrix difference = job.report.lens_cov.inverse() - job.problem.lens_information;
+  const LensCorrection::Matrix added = share * 0.5 * (difference + difference.transpose());
+  // A window that has not converged may have negative curvature: it is ignored.
   const LensCorrection::Matrix sum = lens_information_ + added;
-  const bool grows = Eigen::LLT<LensCorrection::Matrix>(sum - kNoLoss * lens_information_).info() == Eigen::Success;
+  const bool grows =
+      Eigen::LLT<LensCorrection::Matrix>(sum - kMinRetainedInformation * lens_information_).info() == Eigen::Success;
   if (added.allFinite() && grows) lens_information_ = sum;
 }
 
 double LocalMap::focal_std() const {
   constexpr int kFocal = LensCorrection::kFocal;
-  const LensCorrection::Matrix cov = config_.alike_sightings * lens_information_.inverse();
+  const LensCorrection::Matrix cov = config_.correlated_observations * lens_information_.inverse();
   return std::sqrt(cov(kFocal, kFocal));
 }
 
@@ -233,8 +238,8 @@ void LocalMap::rescale(double factor) {
   const Eigen::Vector3d centre = keyframes_.back().T_map_camera.p;
   for (Keyframe& k : keyframes_) {
     k.T_map_camera.p = centre + factor * (k.T_map_camera.p - centre);
-    if (k.held_distance) k.held_distance = factor * *k.held_distance;
-    k.pull.topRows<3>() *= factor;
+    if (k.reference_distance) k.reference_distance = factor * *k.reference_distance;
+    k.lens_sensitivity.topRows<3>() *= factor;
   }
   for (auto& [track, landmark] : landmarks_) {
     if (landmark.p_map) landmark.p_map = centre + factor * (*landmark.p_map - centre);
@@ -244,7 +249,7 @@ void LocalMap::rescale(double factor) {
 void LocalMap::move(const SE3& T) {
   for (Keyframe& k : keyframes_) {
     k.T_map_camera = T * k.T_map_camera;
-    k.pull.topRows<3>() = (T.R() * k.pull.topRows<3>()).eval();
+    k.lens_sensitivity.topRows<3>() = (T.R() * k.lens_sensitivity.topRows<3>()).eval();
   }
   for (auto& [track, landmark] : landmarks_) {
     if (landmark.p_map) landmark.p_map = T * *landmark.p_map;
@@ -254,7 +259,7 @@ void LocalMap::move(const SE3& T) {
 template <class Map, class Archive>
 void LocalMap::members(Map& self, Archive& archive) {
   archive(self.next_id_, self.lens_.value, self.lens_prior_.value, self.lens_information_, self.keyframes_,
-          self.landmarks_, self.without_right_, self.one_eyed_);
+          self.landmarks_, self.keyframes_without_right_, self.right_camera_lost_);
 }
 
 void LocalMap::save(StateWriter& writer) const {

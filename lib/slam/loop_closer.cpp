@@ -11,33 +11,33 @@
 namespace roadfix {
 namespace {
 
-constexpr int64_t kRecent = 20;      ///< places just left: seeing them is no loop
-constexpr size_t kCandidates = 4;    ///< whose geometry is tried
-constexpr size_t kMaxPoints = 160;   ///< kept of one place
-constexpr double kMaxDistance = 55;  ///< bits
-constexpr double kRatio = 0.85;      ///< best over second best
+constexpr int64_t kMinPlaceGap = 20;  ///< most recent places, excluded from recognition
+constexpr size_t kCandidates = 4;     ///< verified geometrically
+constexpr size_t kMaxPoints = 160;    ///< stored per place
+constexpr double kMaxDistance = 55;   ///< bits
+constexpr double kRatio = 0.85;       ///< ratio test: best over second best
 constexpr int kMinMatches = 25;
 constexpr int kMinInliers = 20;
 constexpr double kMinInlierShare = 0.4;
 constexpr int kMinScalePairs = 8;
 
-// What ties along the way may have wrong, for the share that each takes of a loop's error: the ratio counts, not the
-// size. One percent of the way, and the turn that half a pixel makes at 700 pixels of focal length.
-constexpr double kWayShare = 0.01;
-constexpr double kLeastWay = 0.01;     // m
-constexpr double kTurn = 0.0007;       // rad
-constexpr double kScaleDrift = 0.003;  // per tie
-constexpr double kBreak = 10.0;        // m, where the odometry jumped
-constexpr double kBreakTurn = 0.3;     // rad
-constexpr double kLoopTurn = 0.003;    // rad, at least
-constexpr double kLoopWay = 0.05;      // m, at least
-constexpr double kLoopScale = 0.02;
+// Sigmas of odometry constraints, for the distribution of a loop's error; only their ratios matter. One percent of the
+// distance, and the rotation of half a pixel at 700 px of focal length.
+constexpr double kOdometryShare = 0.01;
+constexpr double kMinOdometrySigma = 0.01;         // m
+constexpr double kOdometryRotationSigma = 0.0007;  // rad
+constexpr double kScaleDrift = 0.003;              // per constraint
+constexpr double kJumpSigma = 10.0;                // m, where the odometry jumped
+constexpr double kJumpRotationSigma = 0.3;         // rad
+constexpr double kMinLoopRotationSigma = 0.003;    // rad, lower limit
+constexpr double kMinLoopPositionSigma = 0.05;     // m, lower limit
+constexpr double kLoopScaleSigma = 0.02;
 
 struct Pair {
   int view = 0, place = 0;
 };
 
-/// Nearest neighbours both ways, clearly nearer than the next.
+/// Mutual nearest neighbours with ratio test.
 std::vector<Pair> match(const cv::Mat& view, const cv::Mat& place) {
   std::vector<int> best_view(static_cast<size_t>(place.rows), -1);
   std::vector<double> best_distance(static_cast<size_t>(place.rows), std::numeric_limits<double>::infinity());
@@ -85,7 +85,7 @@ std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view,
   if (!solution || solution->num_inliers < kMinInlierShare * static_cast<double>(pairs.size())) return std::nullopt;
   Recognition found{index, std::move(*solution), 1.0};
   if (!with_scale) return found;
-  std::vector<double> ratios;  // lengths in the place's map over lengths in the camera's
+  std::vector<double> ratios;  // lengths in the place's map over lengths of the camera
   const SE3 T_camera_place = found.solution.T_map_camera.inverse();
   for (size_t i = 0; i < pairs.size(); ++i) {
     const auto& own = view.p_camera[static_cast<size_t>(pairs[i].view)];
@@ -112,13 +112,13 @@ std::optional<LoopCloser::Recognition> LoopCloser::recognise(const PlaceView& vi
 }
 
 std::optional<SE3> LoopCloser::locate(const PlaceView& view) const {
-  const auto found = recognise(view, next_id_ - 1, false);  // lost, it has no lengths of its own to compare
+  const auto found = recognise(view, next_id_ - 1, false);  // after a loss there is no scale to compare
   if (!found) return std::nullopt;
   const Sim3 S_place_camera{found->solution.T_map_camera.q, found->solution.T_map_camera.p, 1.0};
   return (S_map_odom_.inverse() * places_[found->place].S_map_camera * S_place_camera).rigid();
 }
 
-void LoopCloser::remember(const PlaceView& view) {
+void LoopCloser::store_place(const PlaceView& view) {
   Place place;
   place.id = next_id_++;
   place.cov = view.cov;
@@ -135,13 +135,14 @@ void LoopCloser::remember(const PlaceView& view) {
 
 void LoopCloser::forget_oldest() {
   places_.pop_front();
-  way_.pop_front();
+  odometry_constraints_.pop_front();
   const int64_t first = places_.front().id;
-  std::erase_if(loops_, [first](const PoseTie& tie) { return tie.a < first || tie.b < first; });
+  std::erase_if(loops_,
+                [first](const PoseConstraint& constraint) { return constraint.a < first || constraint.b < first; });
   index_.forget_before(first);
 }
 
-void LoopCloser::turn(const LevelTurn& turn) {
+void LoopCloser::rotate(const LevellingRotation& turn) {
   const SE3 T = turn.transform();
   const Sim3 S{T.q, T.p, 1.0};
   for (Place& place : places_) {
@@ -160,50 +161,50 @@ void LoopCloser::move(int64_t first, const SE3& T_odom_odom) {
   if (!places_.empty() && places_.back().id >= first) T_odom_last_ = T_odom_odom * T_odom_last_;
 }
 
-bool LoopCloser::visit(const PlaceView& view, bool continuous) {
-  const auto found = recognise(view, next_id_ - kRecent, config_.with_scale);
+bool LoopCloser::add_place(const PlaceView& view, bool continuous) {
+  const auto found = recognise(view, next_id_ - kMinPlaceGap, config_.with_scale);
   const int64_t id = next_id_;
   if (!places_.empty()) {
-    PoseTie tie;
-    tie.a = static_cast<int>(id - 1);
-    tie.b = static_cast<int>(id);
+    PoseConstraint constraint;
+    constraint.a = static_cast<int>(id - 1);
+    constraint.b = static_cast<int>(id);
     const SE3 T = T_odom_last_.inverse() * view.T_odom_camera;
-    tie.S_a_b = {T.q, T.p, 1.0};
+    constraint.S_a_b = {T.q, T.p, 1.0};
     const double way = T.p.norm();
-    tie.sigma << Eigen::Vector3d::Constant(continuous ? kLeastWay + kWayShare * way : kBreak),
-        Eigen::Vector3d::Constant(continuous ? kTurn : kBreakTurn), kScaleDrift;
-    way_.push_back(tie);
+    constraint.sigma << Eigen::Vector3d::Constant(continuous ? kMinOdometrySigma + kOdometryShare * way : kJumpSigma),
+        Eigen::Vector3d::Constant(continuous ? kOdometryRotationSigma : kJumpRotationSigma), kScaleDrift;
+    odometry_constraints_.push_back(constraint);
   }
   const std::optional<size_t> known = found ? std::optional(found->place) : std::nullopt;
   const int64_t known_id = known ? places_[*known].id : -1;
-  remember(view);
+  store_place(view);
   T_odom_last_ = view.T_odom_camera;
   if (!known || known_id < places_.front().id) return false;
 
   const PoseSolution& s = found->solution;
-  PoseTie loop;
+  PoseConstraint loop;
   loop.a = static_cast<int>(known_id);
   loop.b = static_cast<int>(id);
   loop.S_a_b = {s.T_map_camera.q, s.T_map_camera.p, found->scale};
-  const double way_sigma = std::max(kLoopWay, std::sqrt(s.cov.topLeftCorner<3, 3>().trace()));
-  const double turn_sigma = std::max(kLoopTurn, std::sqrt(s.cov.bottomRightCorner<3, 3>().trace()));
-  loop.sigma << Eigen::Vector3d::Constant(way_sigma), Eigen::Vector3d::Constant(turn_sigma), kLoopScale;
+  const double way_sigma = std::max(kMinLoopPositionSigma, std::sqrt(s.cov.topLeftCorner<3, 3>().trace()));
+  const double turn_sigma = std::max(kMinLoopRotationSigma, std::sqrt(s.cov.bottomRightCorner<3, 3>().trace()));
+  loop.sigma << Eigen::Vector3d::Constant(way_sigma), Eigen::Vector3d::Constant(turn_sigma), kLoopScaleSigma;
   loops_.push_back(loop);
 
   std::vector<Sim3> nodes;
   for (const Place& place : places_) nodes.push_back(place.S_map_camera);
-  std::vector<PoseTie> ties(way_.begin(), way_.end());
-  const size_t first_loop = ties.size();
-  ties.insert(ties.end(), loops_.begin(), loops_.end());
+  std::vector<PoseConstraint> constraints(odometry_constraints_.begin(), odometry_constraints_.end());
+  const size_t first_loop = constraints.size();
+  constraints.insert(constraints.end(), loops_.begin(), loops_.end());
   const int first = static_cast<int>(places_.front().id);
-  for (PoseTie& tie : ties) {
-    tie.a -= first;
-    tie.b -= first;
+  for (PoseConstraint& constraint : constraints) {
+    constraint.a -= first;
+    constraint.b -= first;
   }
-  (void)optimise(nodes, ties, first_loop, config_.with_scale);
+  (void)optimise(nodes, constraints, first_loop, config_.with_scale);
   for (size_t i = 0; i < nodes.size(); ++i) places_[i].S_map_camera = nodes[i];
   S_map_odom_ = nodes.back() * Sim3{view.T_odom_camera.q, view.T_odom_camera.p, 1.0}.inverse();
-  Matrix6d cov = s.cov;  // seen from the place known, whose own doubt comes on top
+  Matrix6d cov = s.cov;  // relative to the recognised place, whose covariance is added
   const Eigen::Matrix3d R_map_place = places_[static_cast<size_t>(known_id - first)].S_map_camera.q.toRotationMatrix();
   cov.topLeftCorner<3, 3>() = R_map_place * s.cov.topLeftCorner<3, 3>() * R_map_place.transpose();
   cov.topRightCorner<3, 3>().setZero();
@@ -226,20 +227,20 @@ void get_sim3(Sim3& S, StateReader& reader) {
   S = {T.q, T.p, reader.get<double>()};
 }
 
-void put_tie(const PoseTie& tie, StateWriter& writer) {
-  writer.put(tie.a);
-  writer.put(tie.b);
-  put_sim3(tie.S_a_b, writer);
-  writer.put(tie.sigma);
+void put_tie(const PoseConstraint& constraint, StateWriter& writer) {
+  writer.put(constraint.a);
+  writer.put(constraint.b);
+  put_sim3(constraint.S_a_b, writer);
+  writer.put(constraint.sigma);
 }
 
-PoseTie get_tie(StateReader& reader) {
-  PoseTie tie;
-  reader.get(tie.a);
-  reader.get(tie.b);
-  get_sim3(tie.S_a_b, reader);
-  reader.get(tie.sigma);
-  return tie;
+PoseConstraint get_tie(StateReader& reader) {
+  PoseConstraint constraint;
+  reader.get(constraint.a);
+  reader.get(constraint.b);
+  get_sim3(constraint.S_a_b, reader);
+  reader.get(constraint.sigma);
+  return constraint;
 }
 
 }  // namespace
@@ -258,10 +259,10 @@ void LoopCloser::save(StateWriter& writer) const {
     for (const Eigen::Vector3f& p : place.points) writer.put(p);
     writer.put(std::span<const uint8_t>(place.descriptors.data, place.descriptors.total()));
   }
-  writer.put(static_cast<int64_t>(way_.size()));
-  for (const PoseTie& tie : way_) put_tie(tie, writer);
+  writer.put(static_cast<int64_t>(odometry_constraints_.size()));
+  for (const PoseConstraint& constraint : odometry_constraints_) put_tie(constraint, writer);
   writer.put(static_cast<int64_t>(loops_.size()));
-  for (const PoseTie& tie : loops_) put_tie(tie, writer);
+  for (const PoseConstraint& constraint : loops_) put_tie(constraint, writer);
 }
 
 void LoopCloser::load(StateReader& reader) {
@@ -283,7 +284,7 @@ void LoopCloser::load(StateReader& reader) {
     if (rows > 0) place.descriptors = cv::Mat(rows, 32, CV_8UC1, bytes.data()).clone();
     index_.add(place.id, place.descriptors);
   }
-  for (auto left = reader.get<int64_t>(); left > 0; --left) way_.push_back(get_tie(reader));
+  for (auto left = reader.get<int64_t>(); left > 0; --left) odometry_constraints_.push_back(get_tie(reader));
   for (auto left = reader.get<int64_t>(); left > 0; --left) loops_.push_back(get_tie(reader));
 }
 

@@ -1,4 +1,4 @@
-/// Remembers places, knows them again, and bends the way between so that both visits agree. MODEL.md (M.17)-(M.20).
+/// Place recognition and loop closure by pose graph optimisation. MODEL.md (S.12.1)-(S.12.4).
 ///
 /// odom: the tracker's own frame, in which its pose never jumps; map: the same with all loops closed.
 #pragma once
@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "slam/level.h"
+#include "slam/levelling.h"
 #include "slam/place_index.h"
 #include "slam/pose_graph.h"
 #include "slam/pose_solver.h"
@@ -16,41 +16,40 @@
 
 namespace roadfix {
 
-/// What the camera sees at one place.
+/// Observation of one place.
 struct PlaceView {
   int64_t t_us = 0;
   SE3 T_odom_camera;
   std::vector<Eigen::Vector2d> normalised;               ///< corners
   cv::Mat descriptors;                                   ///< one row each
-  std::vector<std::optional<Eigen::Vector3d>> p_camera;  ///< where the point of a corner is known
+  std::vector<std::optional<Eigen::Vector3d>> p_camera;  ///< where the corner has a known point
   Matrix6d cov = Matrix6d::Zero();                       ///< of the camera's pose in map
 };
 
 struct LoopCloserConfig {
   PoseSolverConfig pose;
-  bool with_scale = false;  ///< mono: lengths drift too
-  int max_places = 1000;    ///< remembered; older ones are forgotten
+  bool with_scale = false;  ///< monocular: optimise the scale too
+  int max_places = 1000;    ///< stored; older ones are removed
 };
 
 class LoopCloser {
  public:
   explicit LoopCloser(const LoopCloserConfig& config) : config_(config) {}
 
-  /// Remembers this place; true where it was known again and the map bent. `continuous`: the odometry did not jump
-  /// since the place before.
-  bool visit(const PlaceView& view, bool continuous);
+  /// Stores this place; true where a loop was closed. `continuous`: the odometry did not jump since the previous place.
+  bool add_place(const PlaceView& view, bool continuous);
 
-  /// Where the camera is in odom, if it sees a place that it knows.
+  /// Camera pose in odom at a recognised place.
   [[nodiscard]] std::optional<SE3> locate(const PlaceView& view) const;
 
-  /// The odometry's axes have been turned; the map's are too.
-  void turn(const LevelTurn& turn);
+  /// Rotates odom and map.
+  void rotate(const LevellingRotation& turn);
 
-  /// The odometry since this place, and the place, have been moved in odom; the map before it stays.
+  /// Transforms the odometry from this place on in odom; the map before it is unchanged.
   void move(int64_t first, const SE3& T_odom_odom);
 
   [[nodiscard]] const Sim3& S_map_odom() const { return S_map_odom_; }
-  /// Covariance of the camera's pose in map, right after a visit() that was true.
+  /// Covariance of the camera's pose in map, right after an add_place() that closed a loop.
   [[nodiscard]] const Matrix6d& cov_after_loop() const { return places_.back().cov; }
   [[nodiscard]] int num_loops() const { return num_loops_; }
   [[nodiscard]] size_t num_places() const { return places_.size(); }
@@ -69,20 +68,20 @@ class LoopCloser {
   };
   struct Recognition {
     size_t place = 0;       ///< index into places_
-    PoseSolution solution;  ///< T_map_camera: of the viewing camera in the place's axes
+    PoseSolution solution;  ///< T_map_camera: of the current camera in the place's axes
     double scale = 1.0;     ///< S_place_camera's
   };
 
   [[nodiscard]] std::optional<Recognition> recognise(const PlaceView& view, int64_t newest, bool with_scale) const;
   [[nodiscard]] std::optional<Recognition> verify(const PlaceView& view, size_t place, bool with_scale) const;
-  void remember(const PlaceView& view);
+  void store_place(const PlaceView& view);
   void forget_oldest();
 
   LoopCloserConfig config_;
   PlaceIndex index_;
   std::deque<Place> places_;
-  std::deque<PoseTie> way_;  ///< from each place to the next; a and b are ids here
-  std::vector<PoseTie> loops_;
+  std::deque<PoseConstraint> odometry_constraints_;  ///< from each place to the next; a and b are ids here
+  std::vector<PoseConstraint> loops_;
   int64_t next_id_ = 0;
   SE3 T_odom_last_;  ///< of the last place
   Sim3 S_map_odom_;

@@ -4,18 +4,18 @@ namespace roadfix {
 namespace {
 
 constexpr int kLens = LensCorrection::kSize;
-constexpr double kMinPointInformation = 1e-9;               ///< keeps a point without parallax where it is
-constexpr double kViewKnown = 100.0, kViewTurnKnown = 1.0;  ///< m, rad: of a view that nothing ties to the others
+constexpr double kMinPointInformation = 1e-9;                   ///< regularises a point without parallax
+constexpr double kViewPrior = 100.0, kViewRotationPrior = 1.0;  ///< m, rad: prior of a view without constraints
 
-/// For a lower triangle or a whole matrix: `rows` of views.
+/// For a lower triangle or a full matrix: `rows` of views.
 void add_view_information(Eigen::MatrixXd& H, int rows) {
   for (int row = 0; row < rows; row += 6) {
-    H.diagonal().segment<3>(row).array() += 1.0 / (kViewKnown * kViewKnown);
-    H.diagonal().segment<3>(row + 3).array() += 1.0 / (kViewTurnKnown * kViewTurnKnown);
+    H.diagonal().segment<3>(row).array() += 1.0 / (kViewPrior * kViewPrior);
+    H.diagonal().segment<3>(row + 3).array() += 1.0 / (kViewRotationPrior * kViewRotationPrior);
   }
 }
 
-/// F with F F' = A, for a symmetric A without negative directions but those of round-off.
+/// F with F F' = A, for a symmetric A, positive semidefinite up to rounding.
 Eigen::MatrixXd square_root(const Eigen::MatrixXd& A) {
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(A);
   const Eigen::MatrixXd L = ldlt.matrixL();
@@ -28,7 +28,7 @@ NormalEquations::NormalEquations(int num_free_views, size_t num_points, size_t n
     : lens_row_(6 * num_free_views),
       H_(Eigen::MatrixXd::Zero(lens_row_ + kLens, lens_row_ + kLens)),
       b_(Eigen::VectorXd::Zero(lens_row_ + kLens)),
-      H_known_(H_),
+      H_prior_(H_),
       points_(num_points) {
   links_.reserve(num_observations);
 }
@@ -36,7 +36,7 @@ NormalEquations::NormalEquations(int num_free_views, size_t num_points, size_t n
 void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobian& J, const Eigen::Vector2d& residual,
                           Weight weight) {
   Point& p = points_[point];
-  p.bend = weight.bend;
+  p.score_curvature = weight.score_curvature;
   const Eigen::Vector2d pull = weight.slope * residual;
   const Eigen::Matrix<double, 3, 2> Jp = weight.curvature * J.point.transpose();
   p.H.noalias() += Jp * J.point;
@@ -55,7 +55,7 @@ void NormalEquations::add(int free_view, size_t point, const ReprojectionJacobia
   const Vector6d b = J.pose.transpose() * pull;
   b_.segment<6>(row) += b;
   if (p.links_end == links_.size() && p.links_end > 0 && links_.back().free_view == free_view) {
-    links_.back().W.noalias() += Jv * J.point;  // the other eye of the same view
+    links_.back().W.noalias() += Jv * J.point;  // the other camera of the same view
     links_.back().b += b;
   } else {
     links_.push_back({free_view, Jv * J.point, b});
@@ -67,7 +67,7 @@ void NormalEquations::add_distance(int free_a, int free_b, const Eigen::Vector3d
   const Eigen::Matrix3d H = J_b * J_b.transpose();
   const auto add = [&](int row, int column, double sign) {
     H_.block<3, 3>(row, column) += sign * H;
-    H_known_.block<3, 3>(row, column) += sign * H;
+    H_prior_.block<3, 3>(row, column) += sign * H;
   };
   if (free_a >= 0) {
     add(6 * free_a, 6 * free_a, 1.0);
@@ -80,11 +80,11 @@ void NormalEquations::add_distance(int free_a, int free_b, const Eigen::Vector3d
   if (free_a >= 0 && free_b >= 0) add(6 * std::max(free_a, free_b), 6 * std::min(free_a, free_b), -1.0);
 }
 
-void NormalEquations::add_tie(int free_a, int free_b, const Matrix6d& J_a, const Matrix6d& J_b,
-                              const Vector6d& residual) {
+void NormalEquations::add_relative_pose(int free_a, int free_b, const Matrix6d& J_a, const Matrix6d& J_b,
+                                        const Vector6d& residual) {
   const auto add = [&](int row, int column, const Matrix6d& H) {
     H_.block<6, 6>(6 * row, 6 * column) += H;
-    H_known_.block<6, 6>(6 * row, 6 * column) += H;
+    H_prior_.block<6, 6>(6 * row, 6 * column) += H;
   };
   if (free_a >= 0) {
     add(free_a, free_a, J_a.transpose() * J_a);
@@ -100,7 +100,7 @@ void NormalEquations::add_tie(int free_a, int free_b, const Matrix6d& J_a, const
 void NormalEquations::add_lens_prior(const LensCorrection::Matrix& information,
                                      const LensCorrection::Vector& residual) {
   H_.block<kLens, kLens>(lens_row_, lens_row_) += information;
-  H_known_.block<kLens, kLens>(lens_row_, lens_row_) += information;
+  H_prior_.block<kLens, kLens>(lens_row_, lens_row_) += information;
   b_.segment<kLens>(lens_row_) += information * residual;
 }
 
@@ -125,7 +125,7 @@ NormalEquations::Reduced NormalEquations::reduce(double damping) const {
       Y.emplace_back(links_[i].W * r.inverse_H.back());
       r.s.segment<6>(row).noalias() -= Y.back() * point.b;
       r.S.block<kLens, 6>(lens_row_, row).noalias() -= Y_lens * links_[i].W.transpose();
-      for (size_t j = begin; j <= i; ++j) {  // views ascend within a point: the lower triangle
+      for (size_t j = begin; j <= i; ++j) {  // views ascend within a point: lower triangle
         r.S.block<6, 6>(row, 6 * links_[j].free_view).noalias() -= Y.back() * links_[j].W.transpose();
       }
     }
@@ -140,7 +140,7 @@ NormalEquations::Step NormalEquations::solve(double damping) const {
   Step step{x.head(lens_row_), x.tail<kLens>(), {}};
   step.points.reserve(points_.size());
   size_t begin = 0;
-  for (size_t p = 0; p < points_.size(); ++p) {  // (M.12)
+  for (size_t p = 0; p < points_.size(); ++p) {  // (S.7.10)
     Eigen::Vector3d b = points_[p].b - points_[p].W_lens.transpose() * step.lens;
     const size_t end = std::max(begin, points_[p].links_end);
     for (size_t i = begin; i < end; ++i) {
@@ -184,22 +184,22 @@ size_t NormalEquations::add_scores(Eigen::MatrixXd& lower, Factor factor) const 
 
 Eigen::MatrixXd NormalEquations::covariance() const {
   Reduced r = reduce(0.0);
-  add_scores(r.S, [](const Point& point) { return -point.bend; });
+  add_scores(r.S, [](const Point& point) { return -point.score_curvature; });
   add_view_information(r.S, lens_row_);
   const Eigen::Index n = r.S.rows();
   return r.S.selfadjointView<Eigen::Lower>().ldlt().solve(Eigen::MatrixXd::Identity(n, n));
 }
 
 Eigen::MatrixXd NormalEquations::clustered_covariance(const Eigen::MatrixXd& covariance) const {
-  // What is known beside the pictures has the scatter that its information says.
-  Eigen::MatrixXd scatter = H_known_;
+  // Priors contribute with their information.
+  Eigen::MatrixXd scatter = H_prior_;
   add_view_information(scatter, lens_row_);
   const size_t clusters = add_scores(scatter, [](const Point&) { return 1.0; });
-  // The fit has taken its own share out of the residuals. A track whose errors are all alike still brings two numbers.
+  // Small-sample correction. A track with fully correlated errors still contributes two residuals.
   const auto n = 2.0 * static_cast<double>(clusters), unknowns = static_cast<double>(scatter.rows());
   const double shrunk = n > 2.0 * unknowns ? n / (n - unknowns) : 2.0;
   const Eigen::MatrixXd draws = covariance * square_root(scatter.selfadjointView<Eigen::Lower>());
-  return shrunk * draws * draws.transpose();  // a square: no variance is negative, whatever was rounded
+  return shrunk * draws * draws.transpose();  // a square: positive semidefinite despite rounding
 }
 
 }  // namespace roadfix

@@ -1,5 +1,5 @@
-/// Gauss-Newton's normal equations of a bundle adjustment and their reduction: points out, cameras and lens stay.
-/// MODEL.md (M.9)-(M.12).
+/// Normal equations of a bundle adjustment and their Schur complement: points are eliminated, cameras and lens remain.
+/// MODEL.md (S.7.7)-(S.7.10).
 #pragma once
 
 #include <Eigen/Dense>
@@ -12,14 +12,14 @@ namespace roadfix {
 /// Unknowns: six for each free view, then the lens correction, then three for each point.
 class NormalEquations {
  public:
-  /// `num_observations`: as many as will be added, at most.
+  /// `num_observations`: upper bound.
   NormalEquations(int num_free_views, size_t num_points, size_t num_observations = 0);
 
-  /// How much one observation counts: by the slope of its robust cost in b, by its curvature in H.
+  /// Weight of an observation: slope of its robust cost in b, curvature in H.
   struct Weight {
     double slope = 1.0;
     double curvature = 1.0;
-    double bend = 0.0;  ///< of the whole point's cost, by which its squared score is less in H, (M.13b)
+    double score_curvature = 0.0;  ///< of the track's cost: weight of its squared score, subtracted from H, (S.7.13)
   };
 
   /// One observation, residual and derivatives already divided by sigma; `free_view` is -1 for a fixed one.
@@ -30,9 +30,9 @@ class NormalEquations {
   void add_distance(int free_a, int free_b, const Eigen::Vector3d& J_b, double residual);
 
   /// A residual on the poses of two views; either may be fixed (-1), and free_a is the earlier one.
-  void add_tie(int free_a, int free_b, const Matrix6d& J_a, const Matrix6d& J_b, const Vector6d& residual);
+  void add_relative_pose(int free_a, int free_b, const Matrix6d& J_a, const Matrix6d& J_b, const Vector6d& residual);
 
-  /// What is known of the lens beforehand.
+  /// Prior of the lens correction.
   void add_lens_prior(const LensCorrection::Matrix& information, const LensCorrection::Vector& residual);
 
   struct Step {
@@ -40,15 +40,14 @@ class NormalEquations {
     LensCorrection::Vector lens;
     std::vector<Eigen::Vector3d> points;
   };
-  /// Levenberg and Marquardt's step: diagonal times (1 + damping).
+  /// Levenberg-Marquardt step: diagonal times (1 + damping).
   [[nodiscard]] Step solve(double damping) const;
 
-  /// Inverse of the reduced system: covariance of views and lens, points marginalised, (M.13).
+  /// Inverse of the reduced system: covariance of views and lens, points marginalised, (S.7.11).
   [[nodiscard]] Eigen::MatrixXd covariance() const;
 
-  /// The same where the errors of one point's sightings are alike and of unknown size, but those of different points
-  /// are not: the score of each point counts as one draw (Liang and Zeger 1986, the sandwich over clusters), (M.16).
-  /// `covariance`: what covariance() gave.
+  /// The same for errors of unknown size that are correlated along a track and independent between tracks: the score of
+  /// each point is one sample (Liang and Zeger 1986, cluster sandwich), (S.9.2). `covariance`: from covariance().
   [[nodiscard]] Eigen::MatrixXd clustered_covariance(const Eigen::MatrixXd& covariance) const;
 
  private:
@@ -64,9 +63,9 @@ class NormalEquations {
     Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
     MatrixL3d W_lens = MatrixL3d::Zero();
-    LensCorrection::Vector b_lens = LensCorrection::Vector::Zero();  ///< its share of the lens's
-    double bend = 0.0;
-    size_t links_end = 0;  ///< its links end here, and begin where the point before has its end
+    LensCorrection::Vector b_lens = LensCorrection::Vector::Zero();  ///< its part of the lens's right-hand side
+    double score_curvature = 0.0;
+    size_t links_end = 0;  ///< end of its links; they start at the previous point's end
   };
   struct Reduced {
     Eigen::MatrixXd S;  ///< lower triangle
@@ -74,14 +73,15 @@ class NormalEquations {
     std::vector<Eigen::Matrix3d> inverse_H;  ///< per point, damped
   };
   [[nodiscard]] Reduced reduce(double damping) const;
-  /// Adds the outer product of every point's score, times `factor(point)`, to a lower triangle; returns their number.
+  /// Adds the outer product of every point's score, times `factor(point)`, to a lower triangle; returns the number of
+  /// points.
   template <class Factor>
   size_t add_scores(Eigen::MatrixXd& lower, Factor factor) const;
 
   int lens_row_;
   Eigen::MatrixXd H_;  ///< of views and lens, lower triangle
   Eigen::VectorXd b_;
-  Eigen::MatrixXd H_known_;  ///< the part of H_ that comes from distances and priors, lower triangle
+  Eigen::MatrixXd H_prior_;  ///< contribution of distances and priors to H_, lower triangle
   std::vector<Point> points_;
   std::vector<Link> links_;
 };

@@ -66,7 +66,7 @@ void PlaceIndex::forget_before(int64_t place) {
   while (!words_.empty() && words_.begin()->first < place) {
     for (const uint32_t word : words_.begin()->second) {
       std::vector<int64_t>& list = places_[word];
-      list.erase(list.begin());  // the oldest stands first
+      list.erase(list.begin());  // the oldest is first
     }
     words_.erase(words_.begin());
   }

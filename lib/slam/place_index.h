@@ -1,8 +1,8 @@
-/// Which earlier place looks like this one: binary descriptors as words, an inverted index over them.
+/// Place recognition: binary descriptors as visual words, with an inverted index.
 ///
-/// A word is the value of a fixed, seeded choice of a descriptor's bits (bit sampling, Indyk and Motwani 1998): alike
-/// descriptors fall into the same word in some of several choices. So the vocabulary needs no training and no file;
-/// how much a word tells (its inverse document frequency, Sivic and Zisserman 2003) is learnt on the way.
+/// A word is the value of a fixed, seeded selection of descriptor bits (bit sampling, Indyk and Motwani 1998): similar
+/// descriptors share a word in some of several selections. The vocabulary needs no training and no file; inverse
+/// document frequencies (Sivic and Zisserman 2003) are counted online.
 #pragma once
 
 #include <array>
@@ -21,16 +21,16 @@ class PlaceIndex {
     int64_t place = 0;
     double score = 0.0;  ///< 1: the same words
   };
-  /// The places most like these descriptors, best first, among those up to and including `newest`.
+  /// The most similar places, best first, up to and including `newest`.
   [[nodiscard]] std::vector<Candidate> look_up(const cv::Mat& descriptors, int64_t newest, size_t count) const;
 
   /// Places come in ascending order.
   void add(int64_t place, const cv::Mat& descriptors);
-  /// Forgets the places before this one.
+  /// Removes the places before this one.
   void forget_before(int64_t place);
 
   static constexpr int kTables = 8;
-  static constexpr int kBits = 13;  ///< of 256 that make a word
+  static constexpr int kBits = 13;  ///< of 256, per word
 
  private:
   using Words = std::vector<uint32_t>;  ///< ascending

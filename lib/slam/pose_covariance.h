@@ -1,4 +1,4 @@
-/// Covariances of poses carried from one pose to another. Order: position in the map, rotation in body axes.
+/// Transport of pose covariances between poses. Order: position in the map, rotation in body axes.
 #pragma once
 
 #include "geometry/se3.h"
@@ -6,14 +6,14 @@
 
 namespace roadfix {
 
-/// d error of a pose after the motion T_before_now, which is known exactly / d error before: attitude error becomes
-/// position error. A camera's pose becomes the vehicle's by the motion T_camera_vehicle.
-Matrix6d carried_by(const SE3& T_map_before, const SE3& T_before_now);
+/// Jacobian of the error of a pose after the exactly known motion T_before_now by the error before: attitude error
+/// becomes position error. The motion T_camera_vehicle transports from camera to vehicle.
+Matrix6d pose_transport_jacobian(const SE3& T_map_before, const SE3& T_before_now);
 
 /// Covariance of a pose after that motion.
-Matrix6d carried(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_before_now);
+Matrix6d transported(const Matrix6d& cov, const SE3& T_map_before, const SE3& T_before_now);
 
 /// Covariance of a pose after the change of axes S.
-Matrix6d in_map(const Matrix6d& cov, const Sim3& S);
+Matrix6d rotated(const Matrix6d& cov, const Sim3& S);
 
 }  // namespace roadfix

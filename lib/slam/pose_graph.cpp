@@ -9,15 +9,16 @@ namespace roadfix {
 namespace {
 
 constexpr int kIterations = 12;
-constexpr double kEnoughGain = 1e-4;  ///< relative
-constexpr double kLoopWidth = 5.0;    ///< sigmas at which a loop's weight has halved
-constexpr double kHeldScale = 1e12;   ///< information that keeps a scale where it is
+constexpr double kMinRelativeDecrease = 1e-4;    ///< relative
+constexpr double kLoopWidth = 5.0;               ///< sigmas, width of the Cauchy cost of loops
+constexpr double kFixedScaleInformation = 1e12;  ///< information that fixes a scale
 
-double cost_of(const std::vector<Sim3>& nodes, const std::vector<PoseTie>& ties, size_t first_loop) {
+double cost_of(const std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop) {
   double sum = 0.0;
-  for (size_t i = 0; i < ties.size(); ++i) {
-    const auto& t = ties[i];
-    const double r2 = tie_error(t, nodes[static_cast<size_t>(t.a)], nodes[static_cast<size_t>(t.b)]).squaredNorm();
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    const auto& t = constraints[i];
+    const double r2 =
+        constraint_error(t, nodes[static_cast<size_t>(t.a)], nodes[static_cast<size_t>(t.b)]).squaredNorm();
     constexpr double kWidth2 = kLoopWidth * kLoopWidth;
     sum += i < first_loop ? 0.5 * r2 : 0.5 * kWidth2 * std::log1p(r2 / kWidth2);
   }
@@ -39,15 +40,16 @@ Sim3 retract(const Sim3& S, const Vector7d& d) {
   return {(S.q * exp_q(d.segment<3>(3))).normalized(), S.p + d.head<3>(), S.scale * std::exp(d(6))};
 }
 
-Vector7d tie_error(const PoseTie& tie, const Sim3& S_map_a, const Sim3& S_map_b, Matrix7d* J_a, Matrix7d* J_b) {
+Vector7d constraint_error(const PoseConstraint& constraint, const Sim3& S_map_a, const Sim3& S_map_b, Matrix7d* J_a,
+                          Matrix7d* J_b) {
   const Eigen::Matrix3d R_a_map = S_map_a.q.conjugate().toRotationMatrix();
   const Eigen::Vector3d p_a_b = R_a_map * (S_map_b.p - S_map_a.p) / S_map_a.scale;
   const Eigen::Quaterniond q_a_b = S_map_a.q.conjugate() * S_map_b.q;
   Vector7d r;
-  r.head<3>() = p_a_b - tie.S_a_b.p;
-  r.segment<3>(3) = log_q(tie.S_a_b.q.conjugate() * q_a_b);
-  r(6) = std::log(S_map_b.scale / S_map_a.scale) - std::log(tie.S_a_b.scale);
-  const Vector7d weight = tie.sigma.cwiseInverse();
+  r.head<3>() = p_a_b - constraint.S_a_b.p;
+  r.segment<3>(3) = log_q(constraint.S_a_b.q.conjugate() * q_a_b);
+  r(6) = std::log(S_map_b.scale / S_map_a.scale) - std::log(constraint.S_a_b.scale);
+  const Vector7d weight = constraint.sigma.cwiseInverse();
   if (J_a != nullptr && J_b != nullptr) {
     const Eigen::Matrix3d J_log = right_jacobian_inverse(r.segment<3>(3));
     J_a->setZero();
@@ -66,22 +68,24 @@ Vector7d tie_error(const PoseTie& tie, const Sim3& S_map_a, const Sim3& S_map_b,
   return weight.cwiseProduct(r);
 }
 
-double optimise(std::vector<Sim3>& nodes, const std::vector<PoseTie>& ties, size_t first_loop, bool with_scale) {
-  const auto size = static_cast<Eigen::Index>(7 * (nodes.size() - 1));  // the first node stays
-  double cost = cost_of(nodes, ties, first_loop);
+double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop,
+                bool with_scale) {
+  const auto size = static_cast<Eigen::Index>(7 * (nodes.size() - 1));  // the first node is fixed
+  double cost = cost_of(nodes, constraints, first_loop);
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     std::vector<Eigen::Triplet<double>> entries;
     Eigen::VectorXd b = Eigen::VectorXd::Zero(size);
     const auto add = [&](int row_node, int column_node, const Matrix7d& H) {
-      if (row_node == 0 || column_node == 0 || row_node < column_node) return;  // the lower triangle
+      if (row_node == 0 || column_node == 0 || row_node < column_node) return;  // lower triangle
       for (int r = 0; r < 7; ++r)
         for (int c = 0; c < 7; ++c) entries.emplace_back(7 * (row_node - 1) + r, 7 * (column_node - 1) + c, H(r, c));
     };
-    for (size_t i = 0; i < ties.size(); ++i) {
-      const PoseTie& t = ties[i];
+    for (size_t i = 0; i < constraints.size(); ++i) {
+      const PoseConstraint& t = constraints[i];
       Matrix7d J_a, J_b;
-      const Vector7d r = tie_error(t, nodes[static_cast<size_t>(t.a)], nodes[static_cast<size_t>(t.b)], &J_a, &J_b);
+      const Vector7d r =
+          constraint_error(t, nodes[static_cast<size_t>(t.a)], nodes[static_cast<size_t>(t.b)], &J_a, &J_b);
       const double weight = i < first_loop ? 1.0 : 1.0 / (1.0 + r.squaredNorm() / (kLoopWidth * kLoopWidth));
       add(t.a, t.a, weight * J_a.transpose() * J_a);
       add(t.b, t.b, weight * J_b.transpose() * J_b);
@@ -93,7 +97,7 @@ double optimise(std::vector<Sim3>& nodes, const std::vector<PoseTie>& ties, size
     if (!with_scale) {
       for (size_t n = 1; n < nodes.size(); ++n) {
         const int row = 7 * (static_cast<int>(n) - 1) + 6;
-        entries.emplace_back(row, row, kHeldScale);
+        entries.emplace_back(row, row, kFixedScaleInformation);
       }
     }
     Eigen::SparseMatrix<double> H(size, size);
@@ -106,9 +110,9 @@ double optimise(std::vector<Sim3>& nodes, const std::vector<PoseTie>& ties, size
     for (size_t n = 1; n < nodes.size(); ++n) {
       moved[n] = retract(nodes[n], step.segment<7>(7 * static_cast<Eigen::Index>(n - 1)));
     }
-    const double now = cost_of(moved, ties, first_loop);
+    const double now = cost_of(moved, constraints, first_loop);
     if (!(now < cost)) return cost;
-    const bool enough = cost - now < kEnoughGain * cost;
+    const bool enough = cost - now < kMinRelativeDecrease * cost;
     nodes = std::move(moved);
     cost = now;
     if (enough) break;

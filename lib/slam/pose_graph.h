@@ -1,5 +1,4 @@
-/// Poses along a way, tied by how each was seen from others, moved so that all ties fit best: what closes a loop.
-/// MODEL.md (M.18)-(M.20).
+/// Pose graph optimisation with similarity constraints, for loop closure. MODEL.md (S.12.2)-(S.12.4).
 #pragma once
 
 #include <vector>
@@ -26,19 +25,20 @@ using Matrix7d = Eigen::Matrix<double, 7, 7>;
 /// Perturbation: [p in a's axes, rotation in b's axes, logarithm of the scale].
 Sim3 retract(const Sim3& S, const Vector7d& d);
 
-/// Node b seen from node a.
-struct PoseTie {
+/// Measured similarity of node b relative to node a.
+struct PoseConstraint {
   int a = 0, b = 0;
   Sim3 S_a_b;
   Vector7d sigma = Vector7d::Ones();  ///< of position, rotation and scale
 };
 
-/// How far two nodes are from what a tie says, in sigmas, and its derivatives by their perturbations, (M.19).
-Vector7d tie_error(const PoseTie& tie, const Sim3& S_map_a, const Sim3& S_map_b, Matrix7d* J_a = nullptr,
-                   Matrix7d* J_b = nullptr);
+/// Residual of a constraint, normalised by sigma, and its Jacobians by the perturbations of both nodes, (S.12.3).
+Vector7d constraint_error(const PoseConstraint& constraint, const Sim3& S_map_a, const Sim3& S_map_b,
+                          Matrix7d* J_a = nullptr, Matrix7d* J_b = nullptr);
 
-/// Gauss-Newton; the first node stays. `with_scale`: false keeps every scale as it is. Robust against wrong ties from
-/// `first_loop` on (Cauchy weights). Returns half the sum of squares after it.
-double optimise(std::vector<Sim3>& nodes, const std::vector<PoseTie>& ties, size_t first_loop, bool with_scale);
+/// Gauss-Newton; the first node is fixed. `with_scale`: false fixes every scale. Robust to wrong constraints from
+/// `first_loop` on (Cauchy weights). Returns half the final sum of squares.
+double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop,
+                bool with_scale);
 
 }  // namespace roadfix

@@ -6,8 +6,8 @@
 namespace roadfix {
 namespace {
 
-constexpr int kRounds = 4;         ///< each with a narrower gate than the one before
-constexpr int kStepsPerRound = 3;  ///< Gauss-Newton converges quadratically here
+constexpr int kRounds = 4;                                              ///< with decreasing gates
+constexpr int kStepsPerRound = 3;                                       ///< Gauss-Newton converges quadratically here
 constexpr std::array<double, kRounds> kGateFactor{8.0, 3.0, 1.5, 1.0};  ///< times gate_px
 constexpr int kMinPoints = 4;
 
@@ -17,16 +17,16 @@ struct Normal {
   int count = 0;
 };
 
-/// Normal equations (M.6) of the points whose error is below the gate, with Cauchy weights of that width.
+/// Normal equations (S.4.2) of the points within the gate, with Cauchy weights of its width.
 Normal linearise(std::span<const PosePoint> points, const SE3& T, const PoseSolverConfig& config, double gate_px) {
   Normal n;
-  const Eye eye(T, config.lens);
+  const PosedCamera eye(T, config.lens);
   const double scale = config.focal_px / config.sigma_px;
   const double gate = gate_px / config.sigma_px, width2 = 0.25 * gate * gate;
   ReprojectionJacobian J;
   Eigen::Vector2d seen;
   for (const PosePoint& point : points) {
-    if (!eye.see(point.p_map, seen, &J)) continue;
+    if (!eye.project(point.p_map, seen, &J)) continue;
     const Eigen::Vector2d r = scale * (point.normalised - seen);
     const double r2 = r.squaredNorm();
     if (r2 > gate * gate) continue;
@@ -39,16 +39,16 @@ Normal linearise(std::span<const PosePoint> points, const SE3& T, const PoseSolv
   return n;
 }
 
-/// Fills inliers, their rms and the covariance (M.7) at the solution.
+/// Sets inliers, their RMS and the covariance (S.4.3) at the solution.
 void judge(std::span<const PosePoint> points, const PoseSolverConfig& config, PoseSolution& solution) {
-  const Eye eye(solution.T_map_camera, config.lens);
+  const PosedCamera eye(solution.T_map_camera, config.lens);
   Matrix6d H = Matrix6d::Zero();
   double sum = 0.0;
   ReprojectionJacobian J;
   Eigen::Vector2d seen;
   const double scale = config.focal_px / config.sigma_px;
   for (const PosePoint& point : points) {
-    const bool visible = eye.see(point.p_map, seen, &J);
+    const bool visible = eye.project(point.p_map, seen, &J);
     const double error_px = visible ? config.focal_px * (point.normalised - seen).norm() : 0.0;
     const bool inlier = visible && error_px < config.gate_px;
     solution.inlier.push_back(inlier);
@@ -59,7 +59,7 @@ void judge(std::span<const PosePoint> points, const PoseSolverConfig& config, Po
   }
   if (solution.num_inliers == 0) return;
   solution.rms_px = std::sqrt(sum / (2.0 * solution.num_inliers));
-  const double errors = std::max(1.0, 2.0 * solution.num_inliers - 6.0);  // the fit took six
+  const double errors = std::max(1.0, 2.0 * solution.num_inliers - 6.0);  // residuals less six parameters
   solution.cov =
       sum / (errors * config.focal_px * config.focal_px) * scale * scale * H.ldlt().solve(Matrix6d::Identity());
 }
@@ -90,7 +90,7 @@ std::optional<PoseSolution> search_pose(std::span<const PosePoint> points, const
   std::vector<cv::Point2d> images;
   for (const PosePoint& point : points) {
     objects.emplace_back(point.p_map.x(), point.p_map.y(), point.p_map.z());
-    const Eigen::Vector2d direction = config.lens.straighten(point.normalised);
+    const Eigen::Vector2d direction = config.lens.remove(point.normalised);
     images.emplace_back(direction.x(), direction.y());
   }
   constexpr int kSamples = 200;

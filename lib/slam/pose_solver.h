@@ -1,5 +1,4 @@
-/// The pose of one picture from map points that it sees: robust Gauss-Newton on the reprojection error. MODEL.md
-/// (M.5)-(M.7).
+/// Camera pose from observed map points: robust Gauss-Newton on the reprojection error. MODEL.md (S.4.1)-(S.4.3).
 #pragma once
 
 #include <optional>
@@ -12,7 +11,7 @@ namespace roadfix {
 
 struct PosePoint {
   Eigen::Vector3d p_map;       ///< m
-  Eigen::Vector2d normalised;  ///< where the left eye sees it
+  Eigen::Vector2d normalised;  ///< observation in the left camera
 };
 
 struct PoseSolverConfig {
@@ -25,18 +24,18 @@ struct PoseSolverConfig {
 
 struct PoseSolution {
   SE3 T_map_camera;
-  /// Of retract(T_map_camera, d), for points known exactly: from the errors seen, (M.7).
+  /// Of retract(T_map_camera, d), points assumed exact: scaled by the residuals, (S.4.3).
   Matrix6d cov = Matrix6d::Zero();
   std::vector<bool> inlier;  ///< one per point
   int num_inliers = 0;
   double rms_px = 0.0;  ///< of the inliers, per image coordinate
 };
 
-/// Nothing where fewer than `min_inliers` points agree on a pose.
+/// No value where fewer than `min_inliers` points agree.
 std::optional<PoseSolution> solve_pose(std::span<const PosePoint> points, const SE3& T_map_camera_start,
                                        const PoseSolverConfig& config);
 
-/// The same without a start: three-point samples (Ke and Roumeliotis, 2017, in OpenCV) drawn with a fixed seed, then
+/// The same without an initial pose: three-point samples (Ke and Roumeliotis, 2017, in OpenCV) with a fixed seed, then
 /// solve_pose().
 std::optional<PoseSolution> search_pose(std::span<const PosePoint> points, const PoseSolverConfig& config);
 

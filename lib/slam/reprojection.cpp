@@ -6,24 +6,24 @@
 
 namespace roadfix {
 
-Eigen::Vector2d LensCorrection::bend(const Eigen::Vector2d& direction) const {
+Eigen::Vector2d LensCorrection::apply(const Eigen::Vector2d& direction) const {
   return std::exp(value(kFocal)) * (1.0 + value(kRadial) * direction.squaredNorm()) * direction;
 }
 
-Eigen::Vector2d LensCorrection::straighten(const Eigen::Vector2d& normalised) const {
-  constexpr int kSteps = 6;  // each gains about two digits: the coefficient is a few hundredths
+Eigen::Vector2d LensCorrection::remove(const Eigen::Vector2d& normalised) const {
+  constexpr int kSteps = 6;  // fixed-point iterations, two digits each: the coefficient is a few hundredths
   const Eigen::Vector2d scaled = std::exp(-value(kFocal)) * normalised;
   Eigen::Vector2d direction = scaled;
   for (int i = 0; i < kSteps; ++i) direction = scaled / (1.0 + value(kRadial) * direction.squaredNorm());
   return direction;
 }
 
-SE3 LensCorrection::turned(const SE3& T_right_left) const {
-  const SE3 turn{exp_q(value.segment<3>(kRightTurn)), Eigen::Vector3d::Zero()};
+SE3 LensCorrection::corrected_extrinsics(const SE3& T_right_left) const {
+  const SE3 turn{exp_q(value.segment<3>(kRightRotation)), Eigen::Vector3d::Zero()};
   return turn * SE3{T_right_left.q, std::exp(-value(kFocal)) * T_right_left.p};
 }
 
-Eye::Eye(const SE3& T_map_camera, const LensCorrection& lens)
+PosedCamera::PosedCamera(const SE3& T_map_camera, const LensCorrection& lens)
     : lens_(lens),
       right_(false),
       R_camera_map_(T_map_camera.R().transpose()),
@@ -32,15 +32,16 @@ Eye::Eye(const SE3& T_map_camera, const LensCorrection& lens)
       p_eye_camera_(Eigen::Vector3d::Zero()),
       scale_(std::exp(lens.value(LensCorrection::kFocal))) {}
 
-Eye::Eye(const SE3& T_map_camera, const LensCorrection& lens, const SE3& T_right_left) : Eye(T_map_camera, lens) {
+PosedCamera::PosedCamera(const SE3& T_map_camera, const LensCorrection& lens, const SE3& T_right_left)
+    : PosedCamera(T_map_camera, lens) {
   right_ = true;
-  const SE3 T_eye_camera = lens.turned(T_right_left);
+  const SE3 T_eye_camera = lens.corrected_extrinsics(T_right_left);
   R_eye_camera_ = T_eye_camera.R();
   p_eye_camera_ = T_eye_camera.p;
-  J_turn_ = right_jacobian(-lens.value.segment<3>(LensCorrection::kRightTurn));  // the left Jacobian
+  J_rotation_ = right_jacobian(-lens.value.segment<3>(LensCorrection::kRightRotation));  // the left Jacobian
 }
 
-bool Eye::see(const Eigen::Vector3d& p_map, Eigen::Vector2d& normalised, ReprojectionJacobian* J) const {
+bool PosedCamera::project(const Eigen::Vector3d& p_map, Eigen::Vector2d& normalised, ReprojectionJacobian* J) const {
   const Eigen::Vector3d p_camera = R_camera_map_ * (p_map - p_map_camera_);
   const Eigen::Vector3d p_eye = R_eye_camera_ * p_camera + p_eye_camera_;
   if (!(p_eye.z() > kMinReprojectionDepth)) return false;
@@ -64,7 +65,7 @@ bool Eye::see(const Eigen::Vector3d& p_map, Eigen::Vector2d& normalised, Reproje
   J->correction.rightCols<3>().setZero();
   if (right_) {
     J->correction.col(LensCorrection::kFocal) -= J_eye * p_eye_camera_;
-    J->correction.rightCols<3>() = -J_eye * skew(p_eye) * J_turn_;
+    J->correction.rightCols<3>() = -J_eye * skew(p_eye) * J_rotation_;
   }
   return true;
 }

@@ -1,4 +1,4 @@
-/// The one measurement of visual odometry: where a camera sees a point. MODEL.md (M.1)-(M.4).
+/// Reprojection of a point into a camera. MODEL.md (S.2.1)-(S.2.4).
 #pragma once
 
 #include <Eigen/Dense>
@@ -7,47 +7,47 @@
 
 namespace roadfix {
 
-/// Points nearer than this, m, or behind the camera have no reprojection.
+/// Points closer than this, m, or behind the camera have no reprojection.
 inline constexpr double kMinReprojectionDepth = 0.05;
 
-/// What a calibration may have wrong, and what is estimated beside the motion. All zero: as calibrated.
-/// Order of the vector: kFocal, kRadial, kRightTurn (3).
+/// Correction of the calibration, estimated beside the motion; zero: as calibrated. Order of the vector: kFocal,
+/// kRadial, kRightRotation (3).
 struct LensCorrection {
   static constexpr int kSize = 5;
-  static constexpr int kFocal = 0;      ///< logarithm of true over calibrated focal length, both eyes
-  static constexpr int kRadial = 1;     ///< coefficient of r^2 left over after undistortion, both eyes
-  static constexpr int kRightTurn = 2;  ///< rad, rotation vector of the right eye about its own centre
+  static constexpr int kFocal = 0;          ///< logarithm of true over calibrated focal length, both cameras
+  static constexpr int kRadial = 1;         ///< coefficient of r^2 remaining after undistortion, both cameras
+  static constexpr int kRightRotation = 2;  ///< rad, rotation vector of the right camera about its own centre
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
   Vector value = Vector::Zero();
 
-  /// Where a true direction (x/z, y/z) appears in calibrated coordinates, (M.2).
-  [[nodiscard]] Eigen::Vector2d bend(const Eigen::Vector2d& direction) const;
-  /// The direction that appears there.
-  [[nodiscard]] Eigen::Vector2d straighten(const Eigen::Vector2d& normalised) const;
-  /// T_right_left as calibrated, turned. Its length shrinks as the focal length grows: their product, which makes
-  /// disparity into depth, is what a stereo calibration knows best.
-  [[nodiscard]] SE3 turned(const SE3& T_right_left) const;
+  /// Calibrated coordinates of a true direction (x/z, y/z), (S.2.2).
+  [[nodiscard]] Eigen::Vector2d apply(const Eigen::Vector2d& direction) const;
+  /// Inverse of apply().
+  [[nodiscard]] Eigen::Vector2d remove(const Eigen::Vector2d& normalised) const;
+  /// T_right_left as calibrated, with the corrected rotation. The baseline is divided by the focal length correction:
+  /// their product, which converts disparity to depth, is what a stereo calibration determines best.
+  [[nodiscard]] SE3 corrected_extrinsics(const SE3& T_right_left) const;
 };
 
-/// Derivatives of the normalised image coordinates, (M.3) and (M.4).
+/// Jacobians of the normalised image coordinates, (S.2.3) and (S.2.4).
 struct ReprojectionJacobian {
   Eigen::Matrix<double, 2, 6> pose;                            ///< by retract(T_map_camera, d)
   Eigen::Matrix<double, 2, 3> point;                           ///< by the point in the map
   Eigen::Matrix<double, 2, LensCorrection::kSize> correction;  ///< by the correction's vector
 };
 
-/// One eye at one pose, ready for many points.
-class Eye {
+/// One camera at one pose, with precomputed terms.
+class PosedCamera {
  public:
-  /// The left eye.
-  Eye(const SE3& T_map_camera, const LensCorrection& lens);
-  /// The right eye, T_right_left as calibrated.
-  Eye(const SE3& T_map_camera, const LensCorrection& lens, const SE3& T_right_left);
+  /// The left camera.
+  PosedCamera(const SE3& T_map_camera, const LensCorrection& lens);
+  /// The right camera, T_right_left as calibrated.
+  PosedCamera(const SE3& T_map_camera, const LensCorrection& lens, const SE3& T_right_left);
 
-  /// Calibrated normalised coordinates of a map point, (M.1); false where it is not in front.
-  bool see(const Eigen::Vector3d& p_map, Eigen::Vector2d& normalised, ReprojectionJacobian* J = nullptr) const;
+  /// Calibrated normalised coordinates of a map point, (S.2.1); false where it is not in front of the camera.
+  bool project(const Eigen::Vector3d& p_map, Eigen::Vector2d& normalised, ReprojectionJacobian* J = nullptr) const;
 
  private:
   LensCorrection lens_;
@@ -56,7 +56,7 @@ class Eye {
   Eigen::Vector3d p_map_camera_;
   Eigen::Matrix3d R_eye_camera_;
   Eigen::Vector3d p_eye_camera_;
-  Eigen::Matrix3d J_turn_;  ///< of the right eye's rotation by its vector, in the eye's axes
+  Eigen::Matrix3d J_rotation_;  ///< of the right camera's rotation by its vector, in the camera's axes
   double scale_;
 };
 

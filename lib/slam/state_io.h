@@ -1,4 +1,4 @@
-/// One list of members serves saving and loading: an archive is called with the members in their order.
+/// Serialisation of member lists: one list serves saving and loading.
 #pragma once
 
 #include <deque>
@@ -21,7 +21,7 @@ inline void get_pose(SE3& T, StateReader& reader) {
   reader.get(T.p);
 }
 
-/// A struct that names its own members: `static void members(auto& self, auto& archive) { archive(self.a, self.b); }`.
+/// A struct that lists its members: `static void members(auto& self, auto& archive) { archive(self.a, self.b); }`.
 template <class T, class Archive>
 concept NamesMembers = requires(T& value, Archive& archive) {
   T::members(value, archive);

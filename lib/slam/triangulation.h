@@ -1,4 +1,4 @@
-/// A point from the rays that saw it.
+/// Triangulation of a point from several rays.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,11 @@ struct Ray {
   Eigen::Vector3d direction;  ///< unit, in the map
 };
 
-/// Ray of normalised coordinates seen from a pose.
+/// Ray of normalised coordinates at a pose.
 Ray ray(const SE3& T_map_eye, const Eigen::Vector2d& normalised);
 
-/// The point nearest to all rays, least squares. Nothing where no two rays open an angle of `min_angle`, rad, or where
-/// the point is not in front of every origin.
+/// Least-squares intersection of all rays. No value where no two rays enclose `min_angle`, rad, or where the point is
+/// behind an origin.
 std::optional<Eigen::Vector3d> triangulate(std::span<const Ray> rays, double min_angle);
 
 }  // namespace roadfix

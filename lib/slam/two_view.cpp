@@ -14,7 +14,8 @@ std::vector<cv::Point2d> to_cv(std::span<const Eigen::Vector2d> points) {
   return out;
 }
 
-/// How many of the pairs turning alone (Kabsch, 1976) does not explain: with few of them the motion is not to be had.
+/// Number of pairs that a pure rotation (Kabsch, 1976) does not explain; with few of them the translation is not
+/// observable.
 int num_beyond_turning(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second, double gate) {
   Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
   for (size_t i = 0; i < first.size(); ++i) {
@@ -45,7 +46,7 @@ std::optional<TwoView> two_view_motion(std::span<const Eigen::Vector2d> first, s
   const cv::Mat E = cv::findEssentialMat(a, b, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence,
                                          config.gate_px / config.focal_px, mask);
   if (E.rows != 3 || E.cols != 3) return std::nullopt;
-  cv::Mat R, t, near = mask.clone();  // recoverPose() keeps those nearer than 50 times the way between the pictures
+  cv::Mat R, t, near = mask.clone();  // recoverPose() keeps points closer than 50 baselines
   cv::recoverPose(E, a, b, cv::Mat::eye(3, 3, CV_64F), R, t, near);
   Eigen::Matrix3d R_second_first;
   for (int r = 0; r < 3; ++r) {
@@ -61,7 +62,7 @@ std::optional<TwoView> two_view_motion(std::span<const Eigen::Vector2d> first, s
     const std::array<Ray, 2> rays{ray(SE3{}, first[i]), ray(result.T_first_second, second[i])};
     const bool point = triangulate(rays, config.min_angle_deg * kDegree).has_value();
     const bool far = rays[0].direction.cross(rays[1].direction).norm() < config.min_angle_deg * kDegree;
-    agreeing += point || far ? 1 : 0;  // who lies behind is on the line by chance
+    agreeing += point || far ? 1 : 0;  // points behind the camera satisfy the epipolar constraint by chance
     points += point ? 1 : 0;
   }
   const double share = static_cast<double>(agreeing) / static_cast<double>(first.size());

@@ -1,4 +1,4 @@
-/// The start without stereo: the motion between two pictures from their common tracks, up to its length.
+/// Monocular initialisation: the motion between two images from their common tracks, up to scale.
 #pragma once
 
 #include <optional>
@@ -12,19 +12,19 @@ namespace roadfix {
 struct TwoViewConfig {
   double focal_px = 0.0;
   double gate_px = 1.5;            ///< distance from the epipolar line
-  double min_angle_deg = 0.6;      ///< of the rays of a point that counts
-  int min_points = 60;             ///< that must have it
-  double min_inlier_share = 0.6;   ///< of all pairs, however far away
-  double sure_inlier_share = 0.8;  ///< from which half as many points will do: on a highway most is far away
+  double min_angle_deg = 0.6;      ///< between the rays of a sufficient point
+  int min_points = 60;             ///< with that angle
+  double min_inlier_share = 0.6;   ///< of all pairs, at any depth
+  double sure_inlier_share = 0.8;  ///< above it half of min_points suffice: on a highway most points are far away
 };
 
 struct TwoView {
   SE3 T_first_second;        ///< |p| = 1
-  std::vector<bool> inlier;  ///< one per pair; those nearer than 50 times the way between the pictures
+  std::vector<bool> inlier;  ///< one per pair; closer than 50 baselines
 };
 
-/// Essential matrix (Nister 2004, in OpenCV, samples drawn with a fixed seed). Nothing where too few points agree, or
-/// where they show too little parallax to tell turning from moving.
+/// Essential matrix (Nister 2004, in OpenCV, samples drawn with a fixed seed). No value where too few points agree, or
+/// where the parallax does not separate rotation from translation.
 std::optional<TwoView> two_view_motion(std::span<const Eigen::Vector2d> first, std::span<const Eigen::Vector2d> second,
                                        const TwoViewConfig& config);
 

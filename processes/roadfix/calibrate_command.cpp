@@ -23,7 +23,7 @@
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "vo_tracker/camera_rig.h"
-#include "vo_tracker/picture.h"
+#include "vo_tracker/image.h"
 
 namespace roadfix {
 namespace {
@@ -67,7 +67,7 @@ Drive read_drive(const Options& options, const Calibration& calibration) {
   msckf::StampLine line(left.rate.value_or(0.0), left.stamp_jitter.value_or(0.0));
   PictureTracks tracks(camera_rig(calibration).left, std::nullopt, make_front_end(FrontEndConfig{}));
   each<image_t>(reader, "CAMERA_LEFT", [&](const image_t& m) {
-    const cv::Mat picture = grey_picture(m);
+    const cv::Mat picture = grey_image(m);
     if (!picture.empty()) drive.frames.push_back(tracks.track(line.on_time(m.utime), picture, {}, std::nullopt));
   });
   if (drive.imu.empty() || drive.frames.empty())

@@ -45,8 +45,8 @@ CameraRig camera_rig(const Calibration& calibration) {
   rig.right = intrinsics(*sensors.camera_right, "camera_right");
   rig.T_right_left = mounting(*sensors.camera_right, "camera_right").inverse() * rig.T_vehicle_left;
   if (sensors.stereo) {
-    take_known(sensors.stereo->scale_std, rig.doubt.lengths);
-    take_known(sensors.stereo->focal_std, rig.doubt.turns);
+    take_known(sensors.stereo->scale_std, rig.scale_sigmas.length);
+    take_known(sensors.stereo->focal_std, rig.scale_sigmas.rotation);
   }
   return rig;
 }

@@ -1,4 +1,4 @@
-/// The cameras as lib/slam takes them, out of a calibration.
+/// The cameras of lib/slam from a calibration.
 #pragma once
 
 #include "config/calibration.h"
@@ -6,8 +6,7 @@
 
 namespace roadfix {
 
-/// Throws std::runtime_error naming the key that is missing: without a lens or a place on the vehicle there is no
-/// tracking.
+/// Throws std::runtime_error naming the missing key: intrinsics and extrinsics are required.
 CameraRig camera_rig(const Calibration& calibration);
 
 }  // namespace roadfix

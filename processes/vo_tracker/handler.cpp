@@ -8,7 +8,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr double kUnknownUp_deg = 60.0;  // standard deviation of roll or pitch that no mounting has
+constexpr double kUnknownUp_deg = 60.0;  // sigma of roll or pitch beyond any mounting
 
 bool knows_up(const Calibration& calibration) {
   const auto& mounting = calibration.mounting;

@@ -1,5 +1,5 @@
-/// POSE_VO, VO_STATUS and VO_FEATURES from the cameras and what helps them: translates between messages and an
-/// estimator, lib/slam's in mode `keyframe`, lib/msckf's in mode `msckf`.
+/// POSE_VO, VO_STATUS and VO_FEATURES from the cameras and other sensors: translates between messages and an estimator,
+/// lib/slam in mode `keyframe`, lib/msckf in mode `msckf`.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace roadfix {
 
-/// kAuto: what suits the sensors, mode_for().
+/// kAuto: selected from the sensors by mode_for().
 enum class VoMode { kAuto, kKeyframe, kMsckf };
 
 /// Of mode `msckf`.
@@ -36,9 +36,9 @@ void visit(MsckfVoConfig& c, Visitor& v) {
 /// configs/VEHICLE/vo_tracker.yaml.
 struct VoTrackerConfig {
   VoMode mode = VoMode::kAuto;
-  int threads = 2;               ///< 2: bundle adjustment runs beside the tracking; the results are the same
-  bool filter_stamps = false;    ///< the left camera's stamps are put on a line at the device's rate
-  double stereo_gap = 0.005;     ///< s, largest difference of the stamps of a stereo pair
+  int threads = 2;               ///< 2: bundle adjustment in parallel with the tracking; the results are the same
+  bool filter_stamps = false;    ///< smooth the left camera's timestamps
+  double stereo_gap = 0.005;     ///< s, maximum stamp difference of a stereo pair
   std::string superpoint_model;  ///< an ONNX file, relative to the configuration's folder; for front end superpoint
   KeyframeTrackerConfig keyframe;
   MsckfVoConfig msckf;
@@ -55,13 +55,12 @@ void visit(VoTrackerConfig& c, Visitor& v) {
   v.group("msckf", c.msckf);
 }
 
-/// The mode of a configuration that leaves it open. One camera beside an IMU without wheels: msckf, whose lengths are
-/// the IMU's own; the keyframe tracker would have them from the INS, which knows its speed no better than the pose that
-/// vision is to hold. Two eyes beside an IMU without wheels, of a rig of which nobody knows what side is up (EuRoC's):
-/// msckf, too, which levels itself by gravity. Otherwise keyframe.
+/// The automatic mode. One camera and an IMU without wheels: msckf, whose scale comes from the IMU; the keyframe
+/// tracker would take it from the INS, which depends on the vision pose itself. Stereo and an IMU without wheels on a
+/// rig of unknown orientation (EuRoC): msckf too, which levels itself by gravity. Otherwise keyframe.
 VoMode mode_for(const Calibration& calibration);
 
-/// `superpoint_weights`: the bytes of superpoint_model. Throws where the calibration has no camera or not all of one.
+/// `superpoint_weights`: the bytes of superpoint_model. Throws on a missing or incomplete camera calibration.
 std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,
                                        const std::vector<uint8_t>& superpoint_weights = {});
 std::unique_ptr<Stage> make_vo_tracker(const std::filesystem::path& vehicle_dir);

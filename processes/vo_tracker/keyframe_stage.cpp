@@ -10,8 +10,8 @@
 #include "slam/keyframe_tracker.h"
 #include "stream/thread_pool.h"
 #include "vo_tracker/camera_rig.h"
+#include "vo_tracker/image.h"
 #include "vo_tracker/messages.h"
-#include "vo_tracker/picture.h"
 
 namespace roadfix {
 namespace {
@@ -21,10 +21,10 @@ enum Output { kPose = 0, kStatus = 1, kFeatures = 2, kClosed = 3 };
 
 constexpr int64_t kFeedback_us = 500'000;    // DESIGN.md, section 4
 constexpr int64_t kWheels_us = 50'000;       // the lateness of WHEELS there
-constexpr int64_t kCameraLost_us = 250'000;  // a few frames: then the left camera goes on alone
+constexpr int64_t kCameraLost_us = 250'000;  // a few frames: then the left camera continues alone
 
 std::unique_ptr<Executor> make_executor(int threads) {
-  if (threads > 1) return std::make_unique<ThreadPool>(1);  // bundle adjustment beside the tracking, no loops
+  if (threads > 1) return std::make_unique<ThreadPool>(1);  // bundle adjustment in parallel with the tracking
   return std::make_unique<InlineExecutor>();
 }
 
@@ -67,17 +67,17 @@ KeyframeStage::~KeyframeStage() = default;
 void KeyframeStage::apply(const Message& m) {
   if (m.input == kLeft) {
     if (left_) track(*left_);
-    left_ = std::make_unique<CameraFrame>(CameraFrame{m.utime, grey_picture(decode<image_t>(m.bytes)), {}});
+    left_ = std::make_unique<CameraFrame>(CameraFrame{m.utime, grey_image(decode<image_t>(m.bytes)), {}});
   } else if (stereo_ && m.input == kRight) {
     const auto gap_us = static_cast<int64_t>(std::llround(config_.stereo_gap * 1e6));
-    if (left_ && std::abs(left_->t_us - m.utime) <= gap_us) left_->right = grey_picture(decode<image_t>(m.bytes));
+    if (left_ && std::abs(left_->t_us - m.utime) <= gap_us) left_->right = grey_image(decode<image_t>(m.bytes));
   } else if (m.input == wheels_) {
     const auto speed = wheel_speed(wheel_sample(decode<wheels_t>(m.bytes)), calibration_.sensors.wheels);
     if (speed) tracker_->speed(*speed);
   } else if (m.input == ins_) {
     const Odometry ins = odometry(decode<pose_t>(m.bytes));
     if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
-    if (const auto level = ins_level(ins)) tracker_->level(*level);
+    if (const auto level = ins_level(ins)) tracker_->add_attitude(*level);
   } else if (m.input == restart_) {
     if (left_) track(*left_);
     tracker_->restart(restart(decode<vo_restart_t>(m.bytes)));
@@ -101,10 +101,10 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   outputs.publish(kPose, pose);
   pose_t closed = vo_closed_pose(frame, tracker_->closed(odometry), origin);
   outputs.publish(kClosed, closed);
-  map_began_ = tracked_ && frame.map_began;
-  if (!tracked_) return;  // a tick without a left picture: nothing new to say but the pose carried on
+  map_started_ = tracked_ && frame.map_started;
+  if (!tracked_) return;  // a tick without a left image: only an extrapolated pose
   tracked_ = false;
-  vo_status_t status = vo_status(frame, tracker_->shared_error_at(now_utime), config_.keyframe.front_end.kind);
+  vo_status_t status = vo_status(frame, tracker_->scale_sensitivity_at(now_utime), config_.keyframe.front_end.kind);
   outputs.publish(kStatus, status);
   vo_features2_t features = vo_features(frame, config_.keyframe.front_end.kind);
   outputs.publish(kFeatures, features);
@@ -131,7 +131,7 @@ void KeyframeStage::load(std::span<const uint8_t> state) {
   tracker_ = std::move(loaded);
   stamps_ = stamps;
   left_.reset();
-  tracked_ = map_began_ = false;
+  tracked_ = map_started_ = false;
 }
 
 std::string KeyframeStage::effective_config() const { return config_text(config_); }

@@ -1,9 +1,8 @@
 /// The keyframe tracker as a stage.
 ///
-/// Clock: CAMERA_RIGHT where there are two cameras, because it is published after CAMERA_LEFT, so that a tick finds the
-/// whole pair; CAMERA_LEFT takes over where the right one falls silent. Nothing but the clock is waited for: a frame is
-/// tracked when it comes, and speeds, which come later, take effect at a fixed delay after their time (as feedback
-/// does), so that the order of their arrival does not matter.
+/// Clock: CAMERA_RIGHT in stereo, because it is published after CAMERA_LEFT, so that a tick has the whole pair;
+/// CAMERA_LEFT takes over where the right one falls silent. A frame is tracked on arrival; speeds, which arrive later,
+/// take effect at a fixed delay after their time (as feedback does), so that their arrival order does not matter.
 #pragma once
 
 #include "bus/stage.h"
@@ -29,8 +28,8 @@ class KeyframeStage final : public Stage {
   void digest(Digest& digest) const override;
   [[nodiscard]] std::vector<uint8_t> save() const override;
   void load(std::span<const uint8_t> state) override;
-  /// Each map's beginning: what led to it need not be computed again.
-  [[nodiscard]] bool wants_snapshot() const override { return map_began_; }
+  /// A snapshot at the start of each map: its past need not be recomputed.
+  [[nodiscard]] bool wants_snapshot() const override { return map_started_; }
   [[nodiscard]] std::string effective_config() const override;
   [[nodiscard]] std::string explained_config() const override;
   [[nodiscard]] std::string effective_calibration() const override;
@@ -46,10 +45,10 @@ class KeyframeStage final : public Stage {
   int wheels_ = 0, ins_ = 0, restart_ = 0;  ///< indices of these inputs
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<KeyframeTracker> tracker_;
-  std::unique_ptr<CameraFrame> left_;  ///< waits for its right picture until the tick's end
+  std::unique_ptr<CameraFrame> left_;  ///< waits for its right image until the end of the tick
   TimestampFilter stamps_;
-  bool tracked_ = false;    ///< a frame since the last publish
-  bool map_began_ = false;  ///< with the frame of the last publish
+  bool tracked_ = false;      ///< a frame since the last publish
+  bool map_started_ = false;  ///< with the frame of the last publish
 };
 
 }  // namespace roadfix

@@ -9,15 +9,15 @@
 namespace roadfix {
 namespace {
 
-// The enums of lib/slam count like the constants of the messages.
+// The enums of lib/slam have the values of the message constants.
 static_assert(static_cast<int>(TrackState::kRelocalised) == vo_status_t::STATE_RELOCALISED);
 static_assert(static_cast<int>(TrackState::kWeak) == vo_status_t::STATE_WEAK);
 static_assert(static_cast<int>(ScaleSource::kStereo) == vo_status_t::SCALE_FROM_STEREO);
 static_assert(static_cast<int>(ScaleSource::kWheels) == vo_status_t::SCALE_FROM_WHEELS);
 static_assert(static_cast<int>(ScaleSource::kIns) == vo_status_t::SCALE_FROM_INS);
-static_assert(static_cast<int>(FeatureUse::kOutlier) == vo_features2_t::USE_OUTLIER);
+static_assert(static_cast<int>(FeatureStatus::kOutlier) == vo_features2_t::USE_OUTLIER);
 
-// Of an ordinary car's wheels, where the calibration says nothing: tyres differ by 2 percent, one sample by 0.05 m/s.
+// Wheels of an uncalibrated car: tyres differ by 2 percent, one sample by 0.05 m/s.
 constexpr double kWheelScaleStd = 0.02;
 constexpr double kWheelNoise = 0.05;  // m/s
 
@@ -80,7 +80,7 @@ const char* name_of(FrontEndKind kind) {
   return "klt";
 }
 
-vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end) {
+vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end) {
   vo_status_t m{};
   m.mode = vo_status_t::MODE_KEYFRAME;
   m.state = static_cast<int8_t>(frame.state);
@@ -92,7 +92,7 @@ vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, Fr
     for (int j = 0; j < shared.cols(); ++j) m.shared_error_m_rad[j][i] = shared(i, j);
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) {
-      m.cov_picture_m2_rad2[i][j] = frame.cov_picture(i, j);
+      m.cov_picture_m2_rad2[i][j] = frame.cov_image(i, j);
       m.cov_map_m2_rad2[i][j] = frame.cov_map(i, j);
     }
   }
@@ -114,13 +114,13 @@ vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, Fr
 vo_features2_t vo_features(const TrackedFrame& frame, FrontEndKind front_end) {
   const TrackNoise noise = track_noise(front_end);
   vo_features2_t m{};
-  for (const UsedFeature& f : frame.features) {
+  for (const TrackedFeature& f : frame.features) {
     TrackSighting s{f.feature.track, f.feature.pixel.cast<double>(), {}, noise.sigma_px, noise.walk_px, 0.0};
     if (f.right) {
       s.right = f.right->cast<double>();
       s.right_sigma_px = noise.right_sigma_px;
     }
-    append(s, static_cast<int8_t>(f.use), m);
+    append(s, static_cast<int8_t>(f.status), m);
   }
   return m;
 }
@@ -154,17 +154,17 @@ std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::opt
 std::optional<SpeedSample> ins_speed(const Odometry& o) {
   const double speed = o.velocity.norm(), variance = o.cov_velocity(0, 0);
   if (o.validity == Validity::kInvalid || !std::isfinite(speed) || !(variance >= 0.0)) return std::nullopt;
-  // A filter's velocity error lasts: within a keyframe or ten it is the same, like a scale's.
+  // Velocity errors of a filter are correlated over several keyframes, like those of a scale.
   const double sigma = std::sqrt(variance);
-  constexpr double kSlow = 1.0;  // m/s, below which a share of the speed says nothing
+  constexpr double kSlow = 1.0;  // m/s, below which a relative speed error is meaningless
   return SpeedSample{o.t_us, SpeedSource::kIns, std::copysign(speed, o.velocity.x()), sigma,
                      sigma / std::max(kSlow, speed)};
 }
 
-std::optional<LevelSample> ins_level(const Odometry& o) {
+std::optional<AttitudeSample> ins_level(const Odometry& o) {
   const double variance = std::max(o.cov_pose(3, 3), o.cov_pose(4, 4));  // rotation in vehicle axes: roll, pitch
   if (o.validity == Validity::kInvalid || !o.T_frame_vehicle.q.coeffs().allFinite() || !(variance > 0.0)) return {};
-  return LevelSample{o.t_us, o.T_frame_vehicle.q, std::sqrt(variance)};
+  return AttitudeSample{o.t_us, o.T_frame_vehicle.q, std::sqrt(variance)};
 }
 
 }  // namespace roadfix

@@ -1,4 +1,4 @@
-/// Messages of the camera tracker to and from lib/slam: units and enums, nothing else.
+/// Conversion between messages and lib/slam: units and enums only.
 #pragma once
 
 #include <roadfix/pose_t.hpp>
@@ -14,18 +14,18 @@ namespace roadfix {
 pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin);
 /// The pose with all loops closed, with resets of its own.
 pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOrigin origin);
-/// `shared`: of the pose told beside it.
+/// `shared`: scale sensitivity of the pose published beside it.
 /// As in the configuration and in VO_STATUS.
 const char* name_of(FrontEndKind kind);
 
-vo_status_t vo_status(const TrackedFrame& frame, const SharedColumns& shared, FrontEndKind front_end);
+vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end);
 vo_features2_t vo_features(const TrackedFrame& frame, FrontEndKind front_end);
 
 void set_reset(int counter, const SE3& delta, pose_t& message);
 Restart restart(const vo_restart_t& message);
-/// How fast the vehicle goes; nothing where the sample cannot tell.
+/// Vehicle speed; no value where the sample has none.
 std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels);
 std::optional<SpeedSample> ins_speed(const Odometry& odometry);
-std::optional<LevelSample> ins_level(const Odometry& odometry);
+std::optional<AttitudeSample> ins_level(const Odometry& odometry);
 
 }  // namespace roadfix

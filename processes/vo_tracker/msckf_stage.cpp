@@ -16,8 +16,8 @@
 #include "features/track_noise.h"
 #include "geometry/frames.h"
 #include "vo_tracker/camera_rig.h"
+#include "vo_tracker/image.h"
 #include "vo_tracker/messages.h"
-#include "vo_tracker/picture.h"
 
 namespace roadfix {
 namespace {
@@ -26,7 +26,7 @@ enum Output { kPose = 0, kStatus = 1, kFeatures = 2 };
 constexpr int kImu = 0, kLeft = 1, kRight = 2;
 
 constexpr int64_t kFeedback_us = 500'000;        // DESIGN.md, section 4
-constexpr int64_t kWheelLateness_us = 50'000;    // there, too
+constexpr int64_t kWheelLateness_us = 50'000;    // as there
 constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
 constexpr int64_t kImuTimeout_us = 200'000;
 
@@ -125,11 +125,11 @@ void MsckfStage::apply(const Message& m) {
     while (!ahead_.empty() && ahead_.front().t_us <= imu.t_us) ahead_.pop_front();
   } else if (m.input == kLeft) {
     if (waiting_) track_waiting();
-    waiting_ = Waiting{m.utime, grey_picture(decode<image_t>(m.bytes)), {}};
+    waiting_ = Waiting{m.utime, grey_image(decode<image_t>(m.bytes)), {}};
   } else if (stereo_ && m.input == kRight) {
     const auto gap_us = static_cast<int64_t>(std::llround(config_.stereo_gap * 1e6));
     if (waiting_ && std::abs(waiting_->t_us - m.utime) <= gap_us)
-      waiting_->right = grey_picture(decode<image_t>(m.bytes));
+      waiting_->right = grey_image(decode<image_t>(m.bytes));
   } else if (m.input == wheels_) {
     filter_->add(wheel_sample(decode<wheels_t>(m.bytes)));
   } else if (m.input == ins_) {
@@ -145,23 +145,23 @@ void MsckfStage::apply(const Message& m) {
 }
 
 void MsckfStage::track_waiting() {
-  const Waiting picture = std::move(*waiting_);
+  const Waiting image = std::move(*waiting_);
   waiting_.reset();
   tracked_ = true;
-  if (picture.left.empty()) return;
-  brightness_ = cv::mean(picture.left)[0];
+  if (image.left.empty()) return;
+  brightness_ = cv::mean(image.left)[0];
   std::optional<CameraMotion> motion;
   if (const auto last = pictures_->last_us()) {
     const std::vector<ImuSample> ahead(ahead_.begin(), ahead_.end());
-    motion = filter_->camera_motion(*last, picture.t_us, ahead);
+    motion = filter_->camera_motion(*last, image.t_us, ahead);
   }
-  filter_->add(pictures_->track(picture.t_us, picture.left, picture.right, motion));
+  filter_->add(pictures_->track(image.t_us, image.left, image.right, motion));
 }
 
 void MsckfStage::on_clock(const Message& m) { ahead_.push_back(imu_sample(decode<imu_t>(m.bytes))); }
 
 void MsckfStage::publish(int64_t now_utime, Outputs& outputs) {
-  if (waiting_) track_waiting();  // its right picture comes with it or not at all
+  if (waiting_) track_waiting();  // without its right image
   const auto period_us = static_cast<int64_t>(std::llround(1e6 * config_.msckf.publish_period));
   const int64_t slot = period_us > 0 ? now_utime / period_us : now_utime;
   if (slot == pose_slot_ && !tracked_) return;

@@ -1,4 +1,5 @@
-/// The visual-inertial filter as a stage: IMU is the clock; pictures, wheels and a start's speed come at the horizon.
+/// The visual-inertial filter as a stage: the IMU is the clock; images, wheels and an initial speed are applied at the
+/// horizon.
 #pragma once
 
 #include <deque>
@@ -11,7 +12,7 @@
 
 namespace roadfix {
 
-/// What a calibration says to the filter; what it leaves open keeps the defaults.
+/// Filter parameters from a calibration; missing entries keep the defaults.
 MsckfVehicle msckf_vehicle(const Calibration& calibration);
 
 class MsckfStage final : public Stage {
@@ -31,7 +32,7 @@ class MsckfStage final : public Stage {
   [[nodiscard]] std::string effective_calibration() const override;
 
  private:
-  struct Waiting {  ///< a left picture that may still get its right one
+  struct Waiting {  ///< a left image that may still receive its right one
     int64_t t_us = 0;
     cv::Mat left, right;
   };
@@ -51,7 +52,7 @@ class MsckfStage final : public Stage {
   std::optional<Waiting> waiting_;
   std::deque<ImuSample> ahead_;  ///< newer than the horizon
   int64_t pose_slot_ = -1;
-  bool tracked_ = false;  ///< a picture since the last publish
+  bool tracked_ = false;  ///< an image since the last publish
   double brightness_ = 0.0;
   std::string note_;  ///< for the next status
 };

@@ -17,7 +17,7 @@ const CameraIntrinsics kLens{400, 136, 230.0, 230.0, 200.0, 68.0, Distortion::kN
 
 double seconds(int64_t t_us) { return 1e-6 * static_cast<double>(t_us); }
 double speed_at(double t) { return std::clamp(kAcceleration * (t - kStand_s), 0.0, kSpeed); }
-double way_at(double t) {
+double distance_at(double t) {
   const double moving = std::max(0.0, t - kStand_s), rising = std::min(moving, kSpeed / kAcceleration);
   return 0.5 * kAcceleration * rising * rising + kSpeed * (moving - rising);
 }
@@ -27,7 +27,7 @@ image_t picture(const Street& street, double x, double way, unsigned seed) {
   m.width_px = kLens.width;
   m.height_px = kLens.height;
   m.format = image_t::FORMAT_PNG;
-  cv::imencode(".png", street.picture({Eigen::Quaterniond::Identity(), {x, 0.0, way}}, kLens, 2.0, seed), m.data);
+  cv::imencode(".png", street.image({Eigen::Quaterniond::Identity(), {x, 0.0, way}}, kLens, 2.0, seed), m.data);
   m.size_bytes = static_cast<int32_t>(m.data.size());
   return m;
 }
@@ -76,7 +76,7 @@ std::vector<DriveMessage> make() {
     if (t == 1'150'000) all.push_back(drive_message("VO_RESTART", utime, 0, restart()));
     if (t % kFrame_us != 0) continue;
     const int64_t i = t / kFrame_us;
-    const double way = way_at(seconds(t));
+    const double way = distance_at(seconds(t));
     all.push_back(drive_message("CAMERA_LEFT", utime, i, picture(street, 0.0, way, static_cast<unsigned>(2 * i + 1))));
     all.push_back(
         drive_message("CAMERA_RIGHT", utime, i, picture(street, kBaseline, way, static_cast<unsigned>(2 * i + 2))));

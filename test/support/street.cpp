@@ -38,8 +38,8 @@ Street::Street(unsigned seed) {
              {{0.0, 0.0, 90.0}, x, y}, {{0.0, 0.0, -90.0}, x, y}, {{0.0, -9.0, 0.0}, z, x}};
 }
 
-cv::Mat Street::picture(const SE3& T_world_camera, const CameraIntrinsics& lens, double noise,
-                        unsigned noise_seed) const {
+cv::Mat Street::image(const SE3& T_world_camera, const CameraIntrinsics& lens, double noise,
+                      unsigned noise_seed) const {
   cv::Mat out(lens.height, lens.width, CV_8UC1);
   std::mt19937 random(noise_seed);
   std::normal_distribution<double> grain(0.0, noise);

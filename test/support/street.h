@@ -16,8 +16,8 @@ class Street {
   explicit Street(unsigned seed);
 
   /// The picture from a pose; grey noise of `noise` levels (standard deviation) from `noise_seed`.
-  [[nodiscard]] cv::Mat picture(const SE3& T_world_camera, const CameraIntrinsics& lens, double noise = 2.0,
-                                unsigned noise_seed = 1) const;
+  [[nodiscard]] cv::Mat image(const SE3& T_world_camera, const CameraIntrinsics& lens, double noise = 2.0,
+                              unsigned noise_seed = 1) const;
 
  private:
   struct Plane {

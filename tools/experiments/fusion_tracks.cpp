@@ -27,7 +27,7 @@ namespace roadfix {
 namespace {
 
 /// As far off as patches are that are followed through drawn pictures: tracks differ, and the tracker loses as much
-/// (scripts/drift, tunnel_lit, stereo, in pictures and here; lib/slam/EVIDENCE.md, section 5).
+/// (scripts/drift, tunnel_lit, stereo, in pictures and here; lib/slam/EVIDENCE.md).
 TrackConfig as_in_pictures() {
   TrackConfig tracks;
   tracks.noise_px = 0.34;
@@ -52,7 +52,7 @@ class TracksStage final : public Stage {
     rig.right = rig.left;
     rig.T_vehicle_left = drive.T_vehicle_left;
     rig.T_right_left = drive.T_left_right.inverse();
-    rig.doubt = {};  // as the calibration of a drive says that is rendered: these are the very lenses
+    rig.scale_sigmas = {};  // as the calibration of a drive says that is rendered: these are the very lenses
     tracker_ = std::make_unique<KeyframeTracker>(KeyframeTrackerConfig{}, rig,
                                                  std::make_unique<test::SimulatedFrontEnd>(seen_), executor_,
                                                  std::make_unique<test::SimulatedRightEye>(seen_));
@@ -79,7 +79,7 @@ class TracksStage final : public Stage {
     } else if (m.input == 2) {
       const Odometry ins = odometry(decode<pose_t>(m.bytes));
       if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
-      if (const auto level = ins_level(ins)) tracker_->level(*level);
+      if (const auto level = ins_level(ins)) tracker_->add_attitude(*level);
     } else {
       tracker_->restart(restart(decode<vo_restart_t>(m.bytes)));
     }
@@ -88,7 +88,7 @@ class TracksStage final : public Stage {
     const TrackedFrame& frame = tracker_->last();
     pose_t pose = vo_pose(frame, tracker_->at(now_utime), calibration_.body_origin.value_or(BodyOrigin::kImu));
     outputs.publish(0, pose);
-    vo_status_t status = vo_status(frame, tracker_->shared_error_at(now_utime), FrontEndKind::kKlt);
+    vo_status_t status = vo_status(frame, tracker_->scale_sensitivity_at(now_utime), FrontEndKind::kKlt);
     outputs.publish(1, status);
   }
   void digest(Digest& digest) const override { tracker_->digest(digest); }

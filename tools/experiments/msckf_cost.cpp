@@ -11,7 +11,7 @@
 #include "geometry/determinism.h"
 #include "program.h"
 #include "vo_tracker/handler.h"
-#include "vo_tracker/picture.h"
+#include "vo_tracker/image.h"
 
 namespace roadfix {
 namespace {
@@ -33,7 +33,7 @@ struct Offered {
 
 std::vector<uint8_t> raw_picture(std::span<const uint8_t> bytes) {
   auto message = decode<image_t>(bytes);
-  const cv::Mat grey = grey_picture(message);
+  const cv::Mat grey = grey_image(message);
   if (grey.empty()) return {bytes.begin(), bytes.end()};
   message.format = image_t::FORMAT_GRAY8;
   message.data.assign(grey.datastart, grey.dataend);

@@ -18,7 +18,7 @@ struct Scene {
   std::vector<Eigen::Vector3d> true_points;
 };
 
-/// A short drive, mono or stereo, with noise on the pictures and on the start values.
+/// A short drive, mono or stereo, with noise on observations and initial values.
 Scene make_scene(unsigned seed, bool stereo, double sigma_px, double start_error) {
   std::mt19937 random(seed);
   const auto uniform = [&](double low, double high) {
@@ -55,8 +55,8 @@ Scene make_scene(unsigned seed, bool stereo, double sigma_px, double start_error
       for (const bool right : {false, true}) {
         if (right && !stereo) continue;
         Eigen::Vector2d seen;
-        const Eye eye = right ? Eye(T, {}, b.T_right_left) : Eye(T, {});
-        if (!eye.see(p, seen)) continue;
+        const PosedCamera eye = right ? PosedCamera(T, {}, b.T_right_left) : PosedCamera(T, {});
+        if (!eye.project(p, seen)) continue;
         seen.x() += normal(sigma_px / kFocal);
         seen.y() += normal(sigma_px / kFocal);
         b.observations.push_back({v, point, right, seen});
@@ -96,7 +96,7 @@ TEST_CASE("bundle adjustment finds the same minimum as Ceres") {
   }
 }
 
-TEST_CASE("the last view's covariance is that of its errors") {
+TEST_CASE("the covariance of the last view is consistent") {
   constexpr int kRuns = 40;
   const auto mean_nees = [](double sigma_px, double track_freedom) {
     double sum = 0.0;
@@ -112,10 +112,10 @@ TEST_CASE("the last view's covariance is that of its errors") {
   const double nees = mean_nees(0.5, BundleProblem{}.track_freedom);
   CHECK(nees > 0.72);  // 99.9 % of 240 degrees of freedom: 0.72 to 1.32
   CHECK(nees < 1.32);
-  CHECK(mean_nees(1.0, 1e9) > 2.0);  // teeth: all tracks have the sigma configured, which is half the true one
+  CHECK(mean_nees(1.0, 1e9) > 2.0);  // teeth: all tracks with the configured sigma, half the true one
 }
 
-/// Errors that are alike along a track: a random walk from sighting to sighting, as a followed patch wanders.
+/// Errors correlated along a track: a random walk from observation to observation.
 void let_tracks_wander(Scene& s, unsigned seed, double step_px) {
   std::mt19937 random(seed);
   std::normal_distribution<double> step(0.0, step_px / kFocal);
@@ -129,7 +129,7 @@ void let_tracks_wander(Scene& s, unsigned seed, double step_px) {
   }
 }
 
-TEST_CASE("the clustered covariance is that of errors alike along a track, whatever their size") {
+TEST_CASE("the clustered covariance is consistent for correlated errors of any size") {
   constexpr int kRuns = 60;
   struct Nees {
     double plain = 0.0, clustered = 0.0;
@@ -149,12 +149,12 @@ TEST_CASE("the clustered covariance is that of errors alike along a track, whate
   const Nees usual = mean_nees(0.5, 0.0), wandering = mean_nees(0.2, 0.7), loud = mean_nees(1.0, 0.0);
   for (const Nees& nees : {usual, wandering, loud}) {
     CHECK(nees.clustered > 0.76);  // 99.9 % of 360 degrees of freedom: 0.76 to 1.26
-    CHECK(nees.clustered < 1.35);  // and what 120 clusters leave uncertain of the covariance itself
+    CHECK(nees.clustered < 1.35);  // and 120 clusters leave the covariance itself uncertain
   }
-  CHECK(wandering.plain > 2.0);  // teeth: what the covariance of independent errors makes of it
+  CHECK(wandering.plain > 2.0);  // teeth: covariance of independent errors
 }
 
-/// Some views see points of their own alone: nothing ties them to the others.
+/// Some views observe only points of their own: nothing constrains them to the others.
 void cut_off_from(int first_view, BundleProblem& problem) {
   const auto shared = static_cast<int>(problem.points.size());
   for (int p = 0; p < shared; ++p) problem.points.emplace_back(problem.points[static_cast<size_t>(p)]);
@@ -163,7 +163,7 @@ void cut_off_from(int first_view, BundleProblem& problem) {
                    [](const auto& a, const auto& b) { return a.point < b.point; });
 }
 
-TEST_CASE("the covariance of views that nothing ties to the others is one, and wide") {
+TEST_CASE("views without constraints have a wide, valid covariance") {
   for (const bool stereo : {false, true}) {
     for (unsigned seed = 0; seed < 20; ++seed) {
       Scene s = make_scene(700 + seed, stereo, 0.5, 0.02);
@@ -178,26 +178,26 @@ TEST_CASE("the covariance of views that nothing ties to the others is one, and w
       CHECK(cut(0) > 0.0);
       CHECK(std::sqrt(cut(5)) > 5.0);  // m
       CHECK(std::sqrt(cut(5)) < 500.0);
-      CHECK(std::sqrt(whole(5)) < 0.5);  // teeth: the same pictures with the ties left
+      CHECK(std::sqrt(whole(5)) < 0.5);  // teeth: the same images with the constraints
     }
   }
 }
 
-TEST_CASE("a wrong focal length and a turned right eye are found") {
+TEST_CASE("a wrong focal length and a rotated right camera are estimated") {
   Scene s = make_scene(9, true, 0.2, 0.0);
   LensCorrection truth;
   truth.value << 0.01, 0.02, 0.002, -0.001, 0.003;
   for (auto& o : s.problem.observations) {
     const SE3& T = s.true_views[static_cast<size_t>(o.view)];
     const Eigen::Vector3d& p = s.true_points[static_cast<size_t>(o.point)];
-    REQUIRE((o.right ? Eye(T, truth, s.problem.T_right_left) : Eye(T, truth)).see(p, o.normalised));
+    REQUIRE((o.right ? PosedCamera(T, truth, s.problem.T_right_left) : PosedCamera(T, truth)).project(p, o.normalised));
   }
   s.problem.lens_information = LensCorrection::Matrix::Identity();
   (void)adjust(s.problem, 30);
   CHECK((s.problem.lens.value - truth.value).norm() < 1e-4);
 }
 
-/// One eye that turns, seen through a lens whose focal length is 2 % longer than told, with distances known.
+/// A rotating monocular camera with a focal length 2 % longer than calibrated and measured distances.
 Scene turning_eye(unsigned seed) {
   Scene s = make_scene(seed, false, 0.1, 0.0);
   LensCorrection truth;
@@ -214,7 +214,7 @@ Scene turning_eye(unsigned seed) {
   std::vector<BundleProblem::Observation> seen;
   for (auto& o : s.problem.observations) {
     const SE3& T = s.true_views[static_cast<size_t>(o.view)];
-    if (!Eye(T, truth).see(s.true_points[static_cast<size_t>(o.point)], o.normalised)) continue;
+    if (!PosedCamera(T, truth).project(s.true_points[static_cast<size_t>(o.point)], o.normalised)) continue;
     o.normalised += Eigen::Vector2d(noise(random), noise(random));
     seen.push_back(o);
   }
@@ -222,7 +222,7 @@ Scene turning_eye(unsigned seed) {
   return s;
 }
 
-TEST_CASE("a pull is what the poses move by where the lens is told to be another") {
+TEST_CASE("the lens sensitivity equals the pose change for a changed lens") {
   Scene s = turning_eye(3);
   const BundleReport report = adjust(s.problem, 50);
   BundleProblem other = s.problem;
@@ -232,20 +232,20 @@ TEST_CASE("a pull is what the poses move by where the lens is told to be another
   (void)adjust(other, 50);
   for (size_t v = 1; v < s.problem.views.size(); ++v) {
     const Vector6d moved = local(s.problem.views[v].T_map_camera, other.views[v].T_map_camera) / kStep;
-    const Vector6d pull = report.pulls[v].col(LensCorrection::kFocal);
+    const Vector6d pull = report.lens_sensitivities[v].col(LensCorrection::kFocal);
     CAPTURE(v, moved.transpose(), pull.transpose());
     CHECK((moved - pull).norm() < 0.1 * pull.norm());
     CHECK((moved + pull).norm() > pull.norm());  // teeth
   }
 }
 
-TEST_CASE("views that are held do not hold the lens that they were adjusted with") {
+TEST_CASE("fixed views do not fix the lens that they were adjusted with") {
   const auto learnt = [](bool pulled) {
     Scene s = turning_eye(4);
-    const BundleReport before = adjust(s.problem, 50);  // the lens believed
+    const BundleReport before = adjust(s.problem, 50);  // the lens fixed
     for (size_t v = 0; v < 4; ++v) {
       s.problem.views[v].fixed = true;
-      if (pulled) s.problem.views[v].pull = before.pulls[v];
+      if (pulled) s.problem.views[v].lens_sensitivity = before.lens_sensitivities[v];
     }
     s.problem.lens_information = LensCorrection::Vector(1e2, 1e12, 1e12, 1e12, 1e12).asDiagonal();
     const BundleReport after = adjust(s.problem, 50);
@@ -261,7 +261,7 @@ TEST_CASE("views that are held do not hold the lens that they were adjusted with
   CHECK(std::abs(error_held) > 2.0 * std::abs(error));
 }
 
-TEST_CASE("a distance between views gives mono its scale") {
+TEST_CASE("a measured distance sets the monocular scale") {
   Scene s = make_scene(12, false, 0.1, 0.0);
   s.problem.views[1].fixed = false;
   s.problem.distances.push_back({0, 1, 2.0 * s.true_views[1].p.norm(), 0.01});
@@ -270,7 +270,7 @@ TEST_CASE("a distance between views gives mono its scale") {
   CHECK(scale == Approx(2.0).epsilon(0.01));
 }
 
-TEST_CASE("one wrong distance of several tears no view from its place") {
+TEST_CASE("a single wrong distance does not displace a view") {
   const auto error = [](double times, bool measured) {
     Scene s = make_scene(13, false, 0.3, 0.02);
     for (int v = 1; v < 6; ++v) {

@@ -1,5 +1,5 @@
-/// The same bundle adjustment by Ceres, with automatic derivatives: what ours is compared with. In a file of its own
-/// because Ceres brings a CHECK that is not Catch2's.
+/// The same bundle adjustment by Ceres with automatic derivatives, as a reference. In a file of its own because Ceres
+/// defines a CHECK that conflicts with Catch2's.
 #pragma once
 
 #include "slam/bundle.h"
@@ -11,7 +11,7 @@ struct CeresResult {
   std::vector<SE3> views;
 };
 
-/// Views and points; the lens stays, the right eye is only beside the left one.
+/// Views and points; the lens is fixed, the right camera is only a baseline away from the left one.
 CeresResult adjust_with_ceres(const BundleProblem& problem);
 
 }  // namespace roadfix::test

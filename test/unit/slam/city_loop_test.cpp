@@ -1,5 +1,4 @@
-/// Two laps of the scenario city_loop, by tracks whose points carry painted patches: is the way closed, and does it
-/// help?
+/// Two laps of the scenario city_loop, by tracks whose points carry rendered patches: loop closure and its benefit.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
@@ -14,7 +13,7 @@ using test::exact_lens;
 using test::FedTracker;
 using test::shortened;
 
-/// Points along a drive, each with a patch of its own that a made-up picture shows where the point is seen.
+/// Points along a drive, each with a patch of its own in a synthetic image.
 class PaintedWorld {
  public:
   PaintedWorld(const SimulatedDrive& drive, double until_s) {
@@ -37,10 +36,10 @@ class PaintedWorld {
     visit_.assign(points_.size(), 0);
   }
 
-  /// What the rig sees, and paints it. A point that comes back into view is a new track.
+  /// Observations of the rig, rendered. A point that re-enters the view is a new track.
   std::vector<TrackObservation> observe(const SE3& T_enu_left, const SE3& T_right_left, const Camera& camera,
-                                        double noise_px, int frame, cv::Mat& picture) {
-    picture.setTo(100);
+                                        double noise_px, int frame, cv::Mat& image) {
+    image.setTo(100);
     std::mt19937 random(static_cast<unsigned>(1000 + frame));
     std::normal_distribution<double> noise(0.0, noise_px);
     const SE3 T_left_enu = T_enu_left.inverse();
@@ -58,7 +57,7 @@ class PaintedWorld {
       o.left = *left + Eigen::Vector2d(noise(random), noise(random));
       o.right = *right + Eigen::Vector2d(noise(random), noise(random));
       const int u = static_cast<int>(std::lround(left->x())), v = static_cast<int>(std::lround(left->y()));
-      patches_[i].copyTo(picture(cv::Rect(u - kPatch / 2, v - kPatch / 2, kPatch, kPatch)));
+      patches_[i].copyTo(image(cv::Rect(u - kPatch / 2, v - kPatch / 2, kPatch, kPatch)));
       all.push_back(o);
     }
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
@@ -81,7 +80,7 @@ struct TwoLaps {
 
 double middle(const std::vector<double>& ascending) { return ascending.at(ascending.size() / 2); }
 
-/// The second lap begins where the car comes by its first pose again.
+/// The second lap starts when the car passes its first pose again.
 TwoLaps two_laps() {
   ScenarioConfig config = shortened("city_loop", 240.0);
   const SimulatedDrive drive = simulate(config, 1);
@@ -100,7 +99,7 @@ TwoLaps two_laps() {
   for (int i = 0; 0.2 * i < config.duration_s - 1.0; ++i) {
     const int64_t t_us = config.start_utime + 200'000 * i;
     const SE3 truth = drive.truth_at(t_us).T_frame_vehicle;
-    const auto tracks = world.observe(truth * T_vehicle_left, T_right_left, camera, 0.4, i, tracker.picture());
+    const auto tracks = world.observe(truth * T_vehicle_left, T_right_left, camera, 0.4, i, tracker.image());
     const TrackedFrame& out = tracker.process(t_us, tracks);
     const double moved = before ? (truth.p - *before).norm() : 0.0;
     before = truth.p;
@@ -137,9 +136,9 @@ TEST_CASE("city_loop closes its loop, and the second lap's error is below 0.3 % 
   CHECK(laps.tracked == laps.frames);
   CHECK(laps.loops >= 5);
   CHECK(laps.closed.back() < 0.003 * laps.second_path);
-  CHECK(middle(laps.closed) < 0.5 * middle(laps.open));  // teeth: the same drive with its loops open
-  CHECK(laps.jumps == 0);                                // the pose that never jumps
-  CHECK(laps.closed_jumps == laps.loops);                // the other one says so each time
+  CHECK(middle(laps.closed) < 0.5 * middle(laps.open));  // teeth: the same drive without loop closure
+  CHECK(laps.jumps == 0);                                // the odometry pose never jumps
+  CHECK(laps.closed_jumps == laps.loops);                // the closed pose counts each jump
 }
 
 }  // namespace

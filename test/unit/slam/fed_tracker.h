@@ -1,4 +1,4 @@
-/// A tracker that is fed tracks instead of pictures, for the tests on scenarios.
+/// A tracker with simulated tracks instead of images, for scenario tests.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -11,7 +11,7 @@
 
 namespace roadfix::test {
 
-/// A tracker whose front end and right eye are fed by hand.
+/// A tracker with simulated front end and right camera.
 class FedTracker {
  public:
   /// `focal_told`: the calibration's focal length over the true one.
@@ -28,7 +28,7 @@ class FedTracker {
     if (stereo) {
       rig.right = rig.left;
       rig.T_right_left = T_left_right(scenario.camera).inverse();
-      rig.doubt = {};
+      rig.scale_sigmas = {};
     }
     tracker_ = std::make_unique<KeyframeTracker>(config, rig, std::make_unique<SimulatedFrontEnd>(seen_), executor_,
                                                  std::make_unique<SimulatedRightEye>(seen_));
@@ -42,7 +42,7 @@ class FedTracker {
 
   KeyframeTracker& operator*() { return *tracker_; }
   KeyframeTracker* operator->() { return tracker_.get(); }
-  cv::Mat& picture() { return picture_; }
+  cv::Mat& image() { return picture_; }
 
  private:
   std::shared_ptr<SeenTracks> seen_ = std::make_shared<SeenTracks>();
@@ -68,7 +68,7 @@ inline ScenarioConfig shortened(const std::string& name, double duration_s) {
   return config;
 }
 
-/// A drive of one eye whose tracks err as followed patches do, which differ.
+/// A monocular drive with track errors as patch tracking has them, of varying sigma.
 inline TrackDrive patches_of_one_eye(const std::string& name, double duration_s, uint64_t seed) {
   ScenarioConfig scenario = shortened(name, duration_s);
   scenario.camera.layout = CameraLayout::kMono;
@@ -78,7 +78,7 @@ inline TrackDrive patches_of_one_eye(const std::string& name, double duration_s,
   return make_track_drive(scenario, seed, tracks);
 }
 
-/// Of the rear wheels, which tell the direction.
+/// Of the rear wheels, with direction.
 inline SpeedSample signed_speed(const WheelSample& w) {
   return {w.t_us, SpeedSource::kWheels, 0.5 * (w.speeds[2] + w.speeds[3]), 0.03, 0.01};
 }

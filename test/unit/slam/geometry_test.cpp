@@ -41,7 +41,7 @@ LensCorrection some_lens(Rng& random) {
   return lens;
 }
 
-/// Largest relative errors of the three derivatives over 20 random cases; `spoil` is added to one entry.
+/// Largest relative errors of the three Jacobians over 20 random cases; `spoil` is added to one entry.
 double jacobian_error(bool right, double spoil = 0.0) {
   Rng random(3);
   const SE3 T_right_left{exp_q({0.01, -0.02, 0.005}), {-0.5, 0.01, 0.02}};
@@ -52,12 +52,12 @@ double jacobian_error(bool right, double spoil = 0.0) {
     const LensCorrection lens = some_lens(random);
     const auto see = [&](const SE3& pose, const Eigen::Vector3d& point, const LensCorrection& l) {
       Eigen::Vector2d seen;
-      REQUIRE((right ? Eye(pose, l, T_right_left) : Eye(pose, l)).see(point, seen));
+      REQUIRE((right ? PosedCamera(pose, l, T_right_left) : PosedCamera(pose, l)).project(point, seen));
       return seen;
     };
     Eigen::Vector2d seen;
     ReprojectionJacobian J;
-    REQUIRE((right ? Eye(T, lens, T_right_left) : Eye(T, lens)).see(p, seen, &J));
+    REQUIRE((right ? PosedCamera(T, lens, T_right_left) : PosedCamera(T, lens)).project(p, seen, &J));
     J.pose(0, 4) += spoil;
     const auto pose = test::numerical_jacobian<2, 6>([&](const Vector6d& d) { return see(retract(T, d), p, lens); });
     const auto point = test::numerical_jacobian<2, 3>([&](const Eigen::Vector3d& d) { return see(T, p + d, lens); });
@@ -69,22 +69,22 @@ double jacobian_error(bool right, double spoil = 0.0) {
   return worst;
 }
 
-TEST_CASE("reprojection derivatives are the numerical ones, for both eyes") {
+TEST_CASE("reprojection Jacobians are the numerical ones, for both cameras") {
   CHECK(jacobian_error(false) < 1e-6);
   CHECK(jacobian_error(true) < 1e-6);
   CHECK(jacobian_error(true, 1e-4) > 1e-5);  // teeth
 }
 
-TEST_CASE("a lens correction is undone") {
+TEST_CASE("remove() inverts apply() of a lens correction") {
   Rng random(5);
   for (int i = 0; i < 50; ++i) {
     const LensCorrection lens = some_lens(random);
     const Eigen::Vector2d direction(uniform(random, -0.8, 0.8), uniform(random, -0.5, 0.5));
-    REQUIRE((lens.straighten(lens.bend(direction)) - direction).norm() < 1e-9);
+    REQUIRE((lens.remove(lens.apply(direction)) - direction).norm() < 1e-9);
   }
 }
 
-TEST_CASE("triangulation finds a point and refuses rays without an angle") {
+TEST_CASE("triangulation finds a point and rejects rays without an angle") {
   const Eigen::Vector3d p(2.0, -1.0, 20.0);
   std::vector<Ray> rays;
   for (const double x : {0.0, 0.5, 1.0}) {
@@ -135,7 +135,7 @@ TEST_CASE("the pose solver is exact without noise and finds its outliers") {
   CHECK_FALSE(search_pose(std::span(scene.points).first(8), config));
 }
 
-TEST_CASE("the pose solver's covariance is that of its errors") {
+TEST_CASE("the covariance of the pose solver is consistent") {
   constexpr int kRuns = 60;
   const auto mean_nees = [](double assumed_px, double share_of_cov = 1.0) {
     double sum = 0.0;
@@ -150,11 +150,11 @@ TEST_CASE("the pose solver's covariance is that of its errors") {
   };
   CHECK(mean_nees(0.5) > 0.75);  // 99.9 % of 360 degrees of freedom: 0.77 to 1.25; Cauchy weights cost a few percent
   CHECK(mean_nees(0.5) < 1.30);
-  CHECK(mean_nees(0.25) < 1.30);     // it comes from the errors, not from what they are assumed to be
+  CHECK(mean_nees(0.25) < 1.30);     // computed from the residuals, not from the configured sigma
   CHECK(mean_nees(0.5, 0.5) > 1.5);  // teeth
 }
 
-TEST_CASE("two views give the motion, and refuse turning on the spot") {
+TEST_CASE("two views give the motion; pure rotation is rejected") {
   Rng random(11);
   const SE3 T_first_second{exp_q({0.01, 0.03, -0.01}), Eigen::Vector3d(0.3, 0.1, 1.0).normalized()};
   std::vector<Eigen::Vector2d> first, second, turned;
@@ -174,7 +174,7 @@ TEST_CASE("two views give the motion, and refuse turning on the spot") {
   CHECK_FALSE(two_view_motion(first, turned, config));
 }
 
-TEST_CASE("two views of a highway give the motion from the few points that are near") {
+TEST_CASE("two views of a highway give the motion from the few near points") {
   Rng random(12);
   std::normal_distribution<double> normal;
   const SE3 T_first_second{exp_q({0.0, 0.01, 0.0}), Eigen::Vector3d::UnitZ()};

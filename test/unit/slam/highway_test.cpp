@@ -1,5 +1,5 @@
-/// A motorway as one camera sees it: most tracks lie at the horizon or in the sky and never become points, and what is
-/// near leaves the picture after a few frames.
+/// A motorway with one camera: most tracks are at the horizon or in the sky and never become points, and near ones
+/// leave the image after a few frames.
 #include <catch2/catch.hpp>
 #include <random>
 
@@ -12,7 +12,7 @@ namespace {
 constexpr double kStep = 3.3;  // m a frame, 33 m/s at 10 Hz
 constexpr int kFrames = 150;
 
-/// Every near point is seen for some 16 m of the way: five frames.
+/// Each near point is visible over some 16 m: five frames.
 class Motorway {
  public:
   Motorway(const Camera& camera, int num_far, double far_from) : camera_(camera), far_from_(far_from) {
@@ -46,14 +46,14 @@ class Motorway {
 
  private:
   Camera camera_;
-  double far_from_;  ///< m of the way, where the horizon comes into view
+  double far_from_;  ///< m along the drive, where the horizon comes into view
   std::mt19937 random_{5};
   std::vector<Eigen::Vector3d> points_;
 };
 
 struct Seen {
   int valid = 0;
-  double length_ratio = 0.0;  ///< of the way's last third over its first
+  double length_ratio = 0.0;  ///< distance estimated in the last third over the first
 };
 
 Seen drive(int num_far, double far_from) {
@@ -79,7 +79,7 @@ Seen drive(int num_far, double far_from) {
   return seen;
 }
 
-TEST_CASE("mono keeps its pose and its scale where most of what it sees is far away") {
+TEST_CASE("mono keeps pose and scale with mostly distant tracks") {
   constexpr double kFromTheStart = 0.0, kUnderWay = 30.0;
   for (const double far_from : {kFromTheStart, kUnderWay}) {
     for (const int num_far : {0, 60, 200}) {
@@ -90,9 +90,9 @@ TEST_CASE("mono keeps its pose and its scale where most of what it sees is far a
   }
 }
 
-constexpr int kBackFrames = kFrames - 20;  // there are points ahead of where they begin
+constexpr int kBackFrames = kFrames - 20;  // there are points ahead of the start
 
-/// Valid poses of a motorway whose pictures come in the order of a car that backs, while it is told to go at `speed`.
+/// Valid poses of a motorway with the images in reverse order, at the measured speed `speed`.
 int valid_backwards(double speed) {
   ScenarioConfig scenario = test::shortened("highway", 20.0);
   test::FedTracker tracker(test::exact_lens(), scenario, false);
@@ -107,13 +107,13 @@ int valid_backwards(double speed) {
   return valid;
 }
 
-TEST_CASE("a start that goes backwards at a speed at which nobody does is none") {
+TEST_CASE("a backward initialisation at an implausible reverse speed is rejected") {
   CHECK(valid_backwards(10.0 * kStep) == 0);
-  CHECK(valid_backwards(-10.0 * kStep) > kBackFrames / 2);  // teeth: told that it backs, it may
+  CHECK(valid_backwards(-10.0 * kStep) > kBackFrames / 2);  // teeth: with a negative speed it is accepted
 }
 
-/// The largest turn (rad) of a valid pose after a truck, which has been alongside, has come to fill the picture and
-/// slides through it; the car goes on, or `stops` by what it tells.
+/// Largest rotation (rad) of a valid pose after a truck alongside fills the image and slides through it; the car
+/// continues, or stops according to its speeds.
 double turned_by_truck(bool stops) {
   constexpr int kAlongside = 50, kFills = 60, kEnd = 66, kTracks = 60;
   constexpr double kSlide = 15.0;  // px a frame
@@ -146,9 +146,9 @@ double turned_by_truck(bool stops) {
   return turn;
 }
 
-TEST_CASE("a truck that slides through the picture of a fast car is no turn of it") {
+TEST_CASE("a truck sliding through the image causes no rotation of a fast car") {
   CHECK(turned_by_truck(false) < 0.01);
-  CHECK(turned_by_truck(true) > 0.02);  // teeth: who has hardly moved has turned
+  CHECK(turned_by_truck(true) > 0.02);  // teeth: at low speed the rotation is plausible
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// Places known again, and the way bent between them.
+/// Place recognition and loop closure.
 #include <catch2/catch.hpp>
 #include <random>
 
@@ -20,21 +20,25 @@ Sim3 random_sim3(std::mt19937& random, double size) {
   return retract(Sim3{}, d);
 }
 
-TEST_CASE("a tie's derivatives are those of its error") {
+TEST_CASE("Jacobians of a pose graph constraint") {
   std::mt19937 random(3);
   for (int i = 0; i < 20; ++i) {
     const Sim3 a = random_sim3(random, 0.8), b = random_sim3(random, 0.8);
-    PoseTie tie;
-    tie.S_a_b = random_sim3(random, 0.3) * (a.inverse() * b);
-    tie.sigma << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.05;
+    PoseConstraint constraint;
+    constraint.S_a_b = random_sim3(random, 0.3) * (a.inverse() * b);
+    constraint.sigma << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.05;
     Matrix7d J_a, J_b;
-    (void)tie_error(tie, a, b, &J_a, &J_b);
+    (void)constraint_error(constraint, a, b, &J_a, &J_b);
     constexpr double kStep = 1e-6;
     for (int k = 0; k < 7; ++k) {
       Vector7d d = Vector7d::Zero();
       d(k) = kStep;
-      const Vector7d a_numeric = (tie_error(tie, retract(a, d), b) - tie_error(tie, retract(a, -d), b)) / (2 * kStep);
-      const Vector7d b_numeric = (tie_error(tie, a, retract(b, d)) - tie_error(tie, a, retract(b, -d))) / (2 * kStep);
+      const Vector7d a_numeric =
+          (constraint_error(constraint, retract(a, d), b) - constraint_error(constraint, retract(a, -d), b)) /
+          (2 * kStep);
+      const Vector7d b_numeric =
+          (constraint_error(constraint, a, retract(b, d)) - constraint_error(constraint, a, retract(b, -d))) /
+          (2 * kStep);
       REQUIRE((J_a.col(k) - a_numeric).norm() < 1e-5 * std::max(1.0, a_numeric.norm()));
       REQUIRE((J_b.col(k) - b_numeric).norm() < 1e-5 * std::max(1.0, b_numeric.norm()));
     }
@@ -50,7 +54,7 @@ TEST_CASE("similarities multiply and invert") {
   CHECK(c.scale == Approx(1.0));
 }
 
-/// A world of points that can be told apart, around a circle that the camera drives, looking ahead.
+/// Distinguishable points around a circle that the camera drives, looking ahead.
 struct World {
   std::vector<Eigen::Vector3d> points;
   cv::Mat descriptors;
@@ -102,7 +106,7 @@ struct Laps {
   std::vector<uint8_t> state;
 };
 
-/// Two laps with an odometry that turns too much and, in mono, shrinks.
+/// Two laps with an odometry with yaw drift and, in mono, scale drift.
 Laps two_laps(bool with_scale, int save_at = -1) {
   LoopCloserConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
@@ -120,7 +124,7 @@ Laps two_laps(bool with_scale, int save_at = -1) {
       step.q = step.q * exp_q({0.0, 0.0007, 0.0002});
       T_odom = T_odom * step;
     }
-    (void)closer->visit(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
+    (void)closer->add_place(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
     if (i != save_at) continue;
     StateWriter writer;
     closer->save(writer);
@@ -140,23 +144,23 @@ Laps two_laps(bool with_scale, int save_at = -1) {
   return laps;
 }
 
-TEST_CASE("a second lap is known again and the way closed, with and without scale") {
+TEST_CASE("a second lap is recognised and the loop closed, with and without scale") {
   for (const bool with_scale : {false, true}) {
     const Laps laps = two_laps(with_scale);
     CHECK(laps.loops > 20);
-    CHECK(laps.odom_error > 2.0);  // teeth: without closing
+    CHECK(laps.odom_error > 2.0);  // teeth: without loop closure
     CHECK(laps.map_error < 0.3);
   }
 }
 
-TEST_CASE("another street is not taken for the one known") {
+TEST_CASE("another street is not recognised as the first") {
   LoopCloserConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
   const World known(1), other(2);
   const auto loops = [&](const World& later) {
     LoopCloser closer(config);
-    for (int i = 0; i < 30; ++i) (void)closer.visit(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
-    for (int i = 0; i < 30; ++i) (void)closer.visit(later.view(on_circle(i), on_circle(i), 1.0, 6), false);
+    for (int i = 0; i < 30; ++i) (void)closer.add_place(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
+    for (int i = 0; i < 30; ++i) (void)closer.add_place(later.view(on_circle(i), on_circle(i), 1.0, 6), false);
     return closer.num_loops();
   };
   CHECK(loops(other) == 0);
@@ -169,13 +173,13 @@ TEST_CASE("the same laps give the same bytes, also through a saved state") {
   CHECK(one.state == two_laps(true, kLap + 10).state);
 }
 
-TEST_CASE("memory is bounded") {
+TEST_CASE("the number of places is bounded") {
   LoopCloserConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
   config.max_places = 30;
   LoopCloser closer(config);
   const World world(1);
-  for (int i = 0; i < 2 * kLap; ++i) (void)closer.visit(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
+  for (int i = 0; i < 2 * kLap; ++i) (void)closer.add_place(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
   CHECK(closer.num_places() == 30);
 }
 

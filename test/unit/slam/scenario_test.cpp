@@ -1,4 +1,4 @@
-/// The tracker on the scenarios, by tracks without pixels: where it must hold and where it must say that it is lost.
+/// The tracker on the scenarios, by simulated tracks: where it must keep its pose and where it must report a loss.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <fstream>
@@ -14,10 +14,10 @@ using test::shortened;
 
 struct Course {
   int frames = 0, tracked = 0;
-  double path = 0.0, error = 0.0;       ///< m, error at the end
-  std::optional<double> lost_s;         ///< when the tracker says lost
-  int false_inliers = 0, outliers = 0;  ///< of moving things and wrong tracks
-  int true_inliers = 0, sightings = 0;  ///< of the others, where the point is known
+  double path = 0.0, error = 0.0;          ///< m, error at the end
+  std::optional<double> lost_s;            ///< time of the reported loss
+  int false_inliers = 0, outliers = 0;     ///< of moving objects and wrong tracks
+  int true_inliers = 0, observations = 0;  ///< of the others, with known points
   int keyframes = 0;
 };
 
@@ -39,10 +39,10 @@ Course run(const ScenarioConfig& config, uint64_t seed, const TrackConfig& track
     if (out.state == TrackState::kLost && !c.lost_s) c.lost_s = t_s;
     std::map<int64_t, bool> wrong;
     for (const TrackObservation& o : frame->tracks) wrong[o.id] = o.is_outlier;
-    for (const UsedFeature& used : out.features) {
-      if (used.use != FeatureUse::kInlier && used.use != FeatureUse::kOutlier) continue;
-      const bool inlier = used.use == FeatureUse::kInlier;
-      (wrong[used.feature.track] ? c.outliers : c.sightings) += 1;
+    for (const TrackedFeature& used : out.features) {
+      if (used.status != FeatureStatus::kInlier && used.status != FeatureStatus::kOutlier) continue;
+      const bool inlier = used.status == FeatureStatus::kInlier;
+      (wrong[used.feature.track] ? c.outliers : c.observations) += 1;
       (wrong[used.feature.track] ? c.false_inliers : c.true_inliers) += inlier ? 1 : 0;
     }
     if (out.odometry.validity != Validity::kValid) continue;
@@ -56,19 +56,19 @@ Course run(const ScenarioConfig& config, uint64_t seed, const TrackConfig& track
   return c;
 }
 
-TEST_CASE("every lit road is tracked, and what moves on it is left out", "[statistics]") {
+TEST_CASE("every lit road is tracked and moving objects are rejected", "[statistics]") {
   for (const char* name : {"city_loop", "highway", "car_park", "cold_start_moving", "turn", "demo", "long_city"}) {
     CAPTURE(name);
     const Course c = run(shortened(name, 40.0), 2);
     CHECK(c.tracked >= 0.99 * c.frames);
     CHECK(c.error < 0.005 * c.path + 0.02);
-    CHECK(c.true_inliers > 0.85 * c.sightings);
+    CHECK(c.true_inliers > 0.85 * c.observations);
     CHECK(c.outliers > 100);
     CHECK(c.false_inliers < 0.02 * c.true_inliers);
   }
 }
 
-TEST_CASE("a lit tunnel under way is tracked") {
+TEST_CASE("a lit tunnel is tracked") {
   ScenarioConfig config = shortened("tunnel_lit", 45.0);
   config.scene.segments = {{0.0, StreetKind::kStreet}, {15.0, StreetKind::kBridge}, {25.0, StreetKind::kTunnelLit}};
   const Course c = run(config, 3);
@@ -76,7 +76,7 @@ TEST_CASE("a lit tunnel under way is tracked") {
   CHECK(c.error < 0.005 * c.path);
 }
 
-TEST_CASE("a picture upside down is no car on its roof") {
+TEST_CASE("an image upside down gives no inverted pose") {
   const ScenarioConfig config = shortened("city_loop", 20.0);
   const test::TrackDrive d = test::make_track_drive(config, 4, {});
   FedTracker tracker(exact_lens(), d.drive.config);
@@ -99,24 +99,24 @@ TEST_CASE("a picture upside down is no car on its roof") {
   CHECK(valid >= kUpright - 1);
 }
 
-TEST_CASE("standing still among moving cars adds no drift") {
+TEST_CASE("a standstill among moving cars adds no drift") {
   TrackConfig tracks;
-  tracks.noise_px = 0.2;  // what optical flow has where the picture does not change
+  tracks.noise_px = 0.2;  // optical flow noise of a static image
   const Course c = run(shortened("standing", 30.0), 5, tracks);
   CHECK(c.tracked == c.frames);
   CHECK(c.error < 0.02);
   CHECK(c.keyframes < 0.1 * c.frames);
 }
 
-/// The begin of city_loop with one eye; the car waits at a light for some seconds.
+/// The start of city_loop, monocular; the car waits at a traffic light for some seconds.
 struct RedLight {
-  int standing = 0, valid = 0;         ///< pictures
-  double moved = 0.0;                  ///< m, at most, from the pose at which the car came to stand
-  int leaving = 0, leaving_valid = 0;  ///< pictures, of those when it has pulled away
-  double way = 0.0, error = 0.0;       ///< m, gone from the light by then, and its error, at most
+  int standing = 0, valid = 0;         ///< images
+  double moved = 0.0;                  ///< m, maximum, from the standstill pose
+  int leaving = 0, leaving_valid = 0;  ///< images, after the pull-away
+  double way = 0.0, error = 0.0;       ///< m, distance from the light by then, and its largest error
 };
 
-/// Wheels tell their speed until the car stands, or all the time.
+/// Wheels measure the speed until the standstill, or always.
 RedLight red_light(double standing_flow_px, bool told_leaving) {
   static const test::TrackDrive kDrive = [] {
     TrackConfig tracks;
@@ -128,7 +128,7 @@ RedLight red_light(double standing_flow_px, bool told_leaving) {
   config.standing_flow_px = standing_flow_px;
   FedTracker tracker(config, kDrive.drive.config, false);
   RedLight light;
-  std::optional<Eigen::Vector3d> stopped, stood;  // where it is told to be and where it is
+  std::optional<Eigen::Vector3d> stopped, standstill_pose;  // estimated and true position
   int count = 0;
   for (const auto& event : kDrive.events) {
     const auto* frame = std::get_if<test::TrackFrame>(&event);
@@ -138,28 +138,28 @@ RedLight red_light(double standing_flow_px, bool told_leaving) {
     const TrackedFrame& out = tracker.process(frame->t_us, frame->tracks);
     const bool valid = out.odometry.validity == Validity::kValid;
     if (stopped && speed > 0.01) {
-      const double way = (kDrive.truth(*frame).T_frame_vehicle.p - *stood).norm();
+      const double way = (kDrive.truth(*frame).T_frame_vehicle.p - *standstill_pose).norm();
       ++light.leaving;
       light.leaving_valid += valid ? 1 : 0;
       light.way = std::max(light.way, way);
       if (valid)
         light.error = std::max(light.error, std::abs((out.odometry.T_frame_vehicle.p - *stopped).norm() - way));
     }
-    if (count < 200 || speed > 0.01) continue;  // it stands at the begin, too
+    if (count < 200 || speed > 0.01) continue;  // it also stands at the start
     ++light.standing;
     light.valid += valid ? 1 : 0;
     if (!stopped) {
       stopped = out.odometry.T_frame_vehicle.p;
-      stood = kDrive.truth(*frame).T_frame_vehicle.p;
+      standstill_pose = kDrive.truth(*frame).T_frame_vehicle.p;
     }
     if (valid) light.moved = std::max(light.moved, (out.odometry.T_frame_vehicle.p - *stopped).norm());
   }
   return light;
 }
 
-TEST_CASE("mono keeps its pose at a red light, where its landmarks come to an end, and when it pulls away") {
+TEST_CASE("mono keeps its pose at a red light without landmarks and through the pull-away") {
   const double known = KeyframeTrackerConfig{}.standing_flow_px;
-  const RedLight held = red_light(known, true), lost = red_light(0.0, false), untold = red_light(known, false);
+  const RedLight held = red_light(known, true), lost = red_light(0.0, false), not_given = red_light(known, false);
   std::printf("red light: %d of %d pictures valid, moved %.3f m; %d where standing is not known\n", held.valid,
               held.standing, held.moved, lost.valid);
   CHECK(held.standing > 20);
@@ -167,26 +167,26 @@ TEST_CASE("mono keeps its pose at a red light, where its landmarks come to an en
   CHECK(held.moved < 0.03);
   CHECK(lost.valid < lost.standing);  // teeth
   std::printf("pulling away: %d of %d pictures valid, %.1f m, wrong by %.3f m; %d without speeds\n", held.leaving_valid,
-              held.leaving, held.way, held.error, untold.leaving_valid);
-  CHECK(untold.valid == untold.standing);
+              held.leaving, held.way, held.error, not_given.leaving_valid);
+  CHECK(not_given.valid == not_given.standing);
   CHECK(held.leaving > 20);
   CHECK(held.way > 5.0);
   CHECK(held.leaving_valid == held.leaving);
   CHECK(held.error < 0.02 * held.way);
-  CHECK(untold.leaving_valid < 0.95 * untold.leaving);  // teeth
+  CHECK(not_given.leaving_valid < 0.95 * not_given.leaving);  // teeth
 }
 
-/// Drives into the dark; a restart at the true pose is given where `light_s` says, zero: never.
+/// Drives into the dark; a restart at the true pose is given at `light_s`, zero: never.
 struct Dark {
   std::optional<double> blind_s, lost_s;
   int tracked_after = 0, frames_after = 0;
-  double error_after = 0.0;  ///< m, at the end, of the pose restarted at
-  int unannounced = 0;       ///< valid frames after the loss that count no jump
+  double error_after = 0.0;  ///< m, at the end, of the pose after the restart
+  int unannounced = 0;       ///< valid frames after the loss without a counted jump
 };
 
 Dark into_the_dark(const ScenarioConfig& config, double light_s) {
   TrackConfig tracks;
-  tracks.moving_cars = false;  // their lamps can be seen in the dark, and are no landmarks
+  tracks.moving_cars = false;  // their lamps are visible in the dark and are no landmarks
   const test::TrackDrive d = test::make_track_drive(config, 1, tracks);
   FedTracker tracker(exact_lens(), d.drive.config);
   Dark dark;
@@ -197,7 +197,7 @@ Dark into_the_dark(const ScenarioConfig& config, double light_s) {
     const double t_s = seconds_between(config.start_utime, frame->t_us);
     const Odometry truth = d.truth(*frame);
     if (dark.lost_s && !restarted && light_s > 0.0 && t_s >= light_s) {
-      const int64_t given_us = frame->t_us - 300'000;  // the pose is old when it comes
+      const int64_t given_us = frame->t_us - 300'000;  // the pose is old on arrival
       const Odometry then = d.drive.truth_at(given_us);
       tracker->restart({given_us, then.T_frame_vehicle, then.velocity, 1e-4 * Matrix6d::Identity()});
       restarted = true;
@@ -220,7 +220,7 @@ Dark into_the_dark(const ScenarioConfig& config, double light_s) {
   return dark;
 }
 
-TEST_CASE("a dark tunnel ends in lost within half a second, and a restart in the light takes the pose given") {
+TEST_CASE("a dark tunnel ends in lost within 0.5 s; a restart in the light takes the given pose") {
   ScenarioConfig config = shortened("tunnel_dark", 50.0);
   config.scene.segments = {{0.0, StreetKind::kStreet}, {15.0, StreetKind::kTunnelDark}, {30.0, StreetKind::kStreet}};
   const Dark dark = into_the_dark(config, 34.0);
@@ -231,17 +231,17 @@ TEST_CASE("a dark tunnel ends in lost within half a second, and a restart in the
   CHECK(*dark.lost_s - *dark.blind_s <= 0.5);
   CHECK(dark.unannounced == 0);
   CHECK(dark.tracked_after >= dark.frames_after - 1);
-  CHECK(dark.error_after < 1.5);  // 0.3 s at 14 m/s went unseen
+  CHECK(dark.error_after < 1.5);  // 0.3 s at 14 m/s were unobserved
 }
 
-TEST_CASE("bare corridor walls are no map: lost within half a second") {
+TEST_CASE("bare corridor walls give no map: lost within 0.5 s") {
   const Course c = run(shortened("corridor", 40.0), 1);
   CHECK(c.tracked == 0);
   REQUIRE(c.lost_s);
   CHECK(*c.lost_s <= 0.5);
 }
 
-TEST_CASE("out of a bare corridor a restart takes the pose given") {
+TEST_CASE("a restart after a bare corridor takes the given pose") {
   ScenarioConfig config = shortened("city_loop", 40.0);
   config.scene.segments = {{0.0, StreetKind::kCorridor}, {20.0, StreetKind::kStreet}};
   const Dark dark = into_the_dark(config, 26.0);
@@ -274,7 +274,7 @@ TEST_CASE("the state of a long drive is bounded") {
   CHECK(10 * sizes[3] < 13 * std::max(sizes[1], sizes[2]));
 }
 
-/// Bytes that the process holds in memory.
+/// Resident memory of the process, bytes.
 size_t resident() {
   std::ifstream statm("/proc/self/statm");
   size_t total = 0, pages = 0;
@@ -282,14 +282,14 @@ size_t resident() {
   return pages * 4096;
 }
 
-/// Half an hour at five pictures a second.
+/// Half an hour at five images per second.
 struct HalfHour {
   std::vector<size_t> states, residents;  ///< bytes, every two minutes
-  int frames = 0, valid = 0;              ///< since the car has moved in a lap: mono needs parallax
+  int frames = 0, valid = 0;              ///< since the start of motion in a lap: mono needs parallax
 };
 
 HalfHour half_hour(bool stereo) {
-  constexpr int kLaps = 15;  // of two minutes each: every lap new tracks, and a restart where it begins
+  constexpr int kLaps = 15;  // of two minutes each: new tracks in each lap, and a restart at its start
   static const test::TrackDrive kDrive = test::make_track_drive(shortened("city_loop", 120.0), 7);
   KeyframeTrackerConfig config = exact_lens();
   config.close_loops = true;

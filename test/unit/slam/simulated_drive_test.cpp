@@ -1,4 +1,4 @@
-/// The estimator on simulated streets, by tracks without pixels: is its covariance that of its errors?
+/// Consistency of the covariance on simulated streets, by simulated tracks.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
@@ -14,12 +14,12 @@ namespace {
 
 constexpr int kFrames = 110;
 constexpr int kStraight = 80;  // first frame after the bend
-constexpr double kStep = 1.0;  // m a frame, 10 m/s
+constexpr double kStep = 1.0;  // m per frame, 10 m/s
 constexpr double kBaseline = 0.5;
 
 const CameraIntrinsics kLens{800, 400, 460.0, 460.0, 400.0, 200.0, Distortion::kNone, {}};
 
-/// Straight, a bend that the seed chooses, up to `sharpness` times 57 degrees, straight.
+/// Straight, a bend from the seed, up to `sharpness` times 57 degrees, straight.
 SE3 true_pose(int frame, uint64_t seed, double sharpness) {
   const double bend = sharpness * 0.02 * (static_cast<double>(seed % 7) - 3.0) / 3.0;  // rad a frame
   SE3 T;
@@ -35,15 +35,15 @@ SE3 true_pose(int frame, uint64_t seed, double sharpness) {
 /// Looking along the vehicle's x, 1.6 m above the ground.
 const SE3 kVehicleLeft{Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.0, 0.0, 1.6}};
 
-/// One pose beside the truth, seen from above, in the vehicle's axes: forward, left, yaw.
+/// One pose and the ground truth in the horizontal plane, in the vehicle's axes: forward, left, yaw.
 struct Passed {
   Eigen::Vector3d error;
-  Eigen::Matrix3d picture, map;  ///< what it says of it that passes
+  Eigen::Matrix3d image, map;  ///< the covariances that do not accumulate
 };
 
 struct Drive {
   std::vector<Passed> passed;
-  double nees = 0.0;                ///< of the last pose against the first, per degree of freedom
+  double nees = 0.0;                ///< of the last pose relative to the first, per degree of freedom
   double error = 0.0, sigma = 0.0;  ///< m, of its position
   double last_way = 0.0;            ///< along the last straight, over the true one
   int valid = 0;
@@ -56,15 +56,15 @@ Eigen::Matrix3d seen_from_above(const Matrix6d& cov, const Eigen::Matrix3d& R_lo
   return to_vehicle * cov * to_vehicle.transpose();
 }
 
-/// What the calibration that the tracker is given has wrong, and what the tracker thinks of it.
+/// Calibration errors, and their configured sigmas.
 struct Calibrated {
   double focal_error = 0.0;         ///< relative
   double scale_error = 0.0;         ///< relative, of what stereo measures
-  double right_shift_px = 0.0;      ///< of the right picture, sideways
-  double right_turn_std_deg = 0.0;  ///< the tracker's doubt
-  SharedDoubt doubt = {};           ///< the same
-  double focal_std = 0.0;           ///< the same, with one eye
-  int right_until = kFrames;        ///< frames that the right eye sees
+  double right_shift_px = 0.0;      ///< lateral shift of the right image
+  double right_turn_std_deg = 0.0;  ///< configured
+  ScaleSigmas scale_sigmas = {};    ///< the same
+  double focal_std = 0.0;           ///< configured, monocular
+  int right_until = kFrames;        ///< frames with a right image
   bool wheels = false;              ///< beside stereo
   double sharpness = 1.0;           ///< of the bend
 };
@@ -88,7 +88,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
     rig.right = rig.left;
     rig.T_right_left = T_left_right.inverse();
     rig.T_right_left.p *= (1.0 + calibrated.scale_error) / (1.0 + calibrated.focal_error);
-    rig.doubt = calibrated.doubt;
+    rig.scale_sigmas = calibrated.scale_sigmas;
   }
   TrackConfig tracks;
   tracks.wanted = 250;
@@ -101,17 +101,17 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
 
   KeyframeTrackerConfig config;
   config.focal_std = calibrated.focal_std;
-  config.radial_std = 0.0;  // that is known exactly
+  config.radial_std = 0.0;  // exactly known
   config.right_turn_std_deg = calibrated.right_turn_std_deg;
   const auto seen = std::make_shared<test::SeenTracks>();
   InlineExecutor executor;
   KeyframeTracker tracker(config, rig, std::make_unique<test::SimulatedFrontEnd>(seen), executor,
                           std::make_unique<test::SimulatedRightEye>(seen));
-  cv::Mat picture(kLens.height, kLens.width, CV_8UC1);
-  for (int i = 0; i < static_cast<int>(picture.total()); ++i) picture.data[i] = static_cast<uint8_t>(37 * i);
+  cv::Mat image(kLens.height, kLens.width, CV_8UC1);
+  for (int i = 0; i < static_cast<int>(image.total()); ++i) image.data[i] = static_cast<uint8_t>(37 * i);
 
   Drive result;
-  constexpr double kSpeedSigma = 0.05;  // m/s: 5 mm a frame, the least that the tracker takes a told way to be off by
+  constexpr double kSpeedSigma = 0.05;  // m/s: 5 mm per frame, the lower bound of the tracker's distance sigma
   std::mt19937 random(static_cast<unsigned>(seed));
   std::normal_distribution<double> speed_noise(0.0, kSpeedSigma);
   std::optional<SE3> T_local_enu;
@@ -126,8 +126,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
     const int64_t t_us = 100'000 * (i + 1);
     if (!stereo || calibrated.wheels)
       tracker.speed({t_us, SpeedSource::kWheels, kStep / 0.1 + speed_noise(random), kSpeedSigma, 0.0});
-    const TrackedFrame& out =
-        tracker.process({t_us, picture, stereo && i < calibrated.right_until ? picture : cv::Mat()});
+    const TrackedFrame& out = tracker.process({t_us, image, stereo && i < calibrated.right_until ? image : cv::Mat()});
     const Odometry& o = out.odometry;
     if (o.validity != Validity::kValid) continue;
     ++result.valid;
@@ -136,8 +135,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
     result.nees = e.dot(o.cov_pose.ldlt().solve(e)) / 6.0;
     const Eigen::Matrix3d R = o.T_frame_vehicle.R();
     const Eigen::Vector3d p = R.transpose() * e.head<3>();
-    result.passed.push_back(
-        {{p.x(), p.y(), e(5)}, seen_from_above(out.cov_picture, R), seen_from_above(out.cov_map, R)});
+    result.passed.push_back({{p.x(), p.y(), e(5)}, seen_from_above(out.cov_image, R), seen_from_above(out.cov_map, R)});
     result.error = e.head<3>().norm();
     if (i <= kStraight) T_local_straight = o.T_frame_vehicle;
     result.last_way = (o.T_frame_vehicle.p - T_local_straight.p).norm() / (kStep * std::max(1, i - kStraight));
@@ -172,12 +170,12 @@ Drives drives(int count, bool stereo, double noise_px, const Calibrated& calibra
   return drives_of(count, stereo, noise_px, [&](int) { return calibrated; });
 }
 
-TEST_CASE("the covariance is that of the errors, whatever the noise", "[statistics]") {
+TEST_CASE("the covariance is consistent with the errors at any noise", "[statistics]") {
   double mean = 0.0;
   for (const bool stereo : {true, false}) {
     for (const double noise_px : {0.3, 0.6}) {
       const Drives d = drives(20, stereo, noise_px);
-      // What scripts/figures.d/keyframe_tracker.py reads.
+      // Read by scripts/figures.d/keyframe_tracker.py.
       std::printf("nees %s %.1f px: %.3f, median error %.3f m, median sigma %.3f m\n", stereo ? "stereo" : "mono",
                   noise_px, d.nees, d.error, d.sigma);
       CHECK(d.nees > 0.6);  // three sigmas of the mean of 20 drives
@@ -189,39 +187,39 @@ TEST_CASE("the covariance is that of the errors, whatever the noise", "[statisti
   CHECK(mean < 1.5);
 }
 
-TEST_CASE("the covariance knows what the calibration may have wrong for the whole way", "[statistics]") {
-  const SharedDoubt doubt = CameraRig{}.doubt;
-  const auto drawn = [](const SharedDoubt& sizes, const SharedDoubt& told) {
+TEST_CASE("systematic calibration errors are contained in the covariance", "[statistics]") {
+  const ScaleSigmas sigmas = CameraRig{}.scale_sigmas;
+  const auto drawn = [](const ScaleSigmas& sizes, const ScaleSigmas& configured) {
     return [=](int seed) {
       std::mt19937 random(static_cast<unsigned>(1000 + seed));
       std::normal_distribution<double> normal;
       Calibrated calibrated;
-      calibrated.scale_error = sizes.lengths * normal(random);
-      calibrated.focal_error = sizes.turns * normal(random);
-      calibrated.doubt = told;
+      calibrated.scale_error = sizes.length * normal(random);
+      calibrated.focal_error = sizes.rotation * normal(random);
+      calibrated.scale_sigmas = configured;
       return calibrated;
     };
   };
   constexpr int kDrives = 10;
-  const auto test = [&](const char* what, const SharedDoubt& sizes, const SharedDoubt& told) {
-    const Drives d = drives_of(kDrives, true, 0.3, drawn(sizes, told));
+  const auto test = [&](const char* what, const ScaleSigmas& sizes, const ScaleSigmas& configured) {
+    const Drives d = drives_of(kDrives, true, 0.3, drawn(sizes, configured));
     std::printf("calibration drawn, %s: nees %.2f, median error %.3f m, median sigma %.3f m\n", what, d.nees, d.error,
                 d.sigma);
     return d.nees;
   };
-  const double nees = test("told", doubt, doubt);
+  const double nees = test("configured", sigmas, sigmas);
   CHECK(nees > 0.5);
   CHECK(nees < 1.7);
-  // Teeth: the same errors where one of the two is not told.
-  CHECK(test("lengths untold", {doubt.lengths, 0.0}, {0.0, doubt.turns}) > 50.0);
-  CHECK(test("turns untold", {0.0, doubt.turns}, {doubt.lengths, 0.0}) > 2.0);
+  // Teeth: the same errors with one of the two not configured.
+  CHECK(test("length scale not configured", {sigmas.length, 0.0}, {0.0, sigmas.rotation}) > 50.0);
+  CHECK(test("rotation scale not configured", {0.0, sigmas.rotation}, {sigmas.length, 0.0}) > 2.0);
 }
 
-/// Per degree of freedom, the error of what passes: beside the mean of two seconds around it, with its trend, over what
-/// is told of it, `told` of one picture.
+/// Per degree of freedom, the squared error that does not accumulate (relative to the mean of two seconds around it,
+/// with its trend) over its covariance, `configured` for one image.
 template <class Told>
-double passing_nees(bool stereo, double noise_px, const Told& told) {
-  constexpr int kDrives = 10, kAround = 10;  // pictures before and after
+double passing_nees(bool stereo, double noise_px, const Told& configured) {
+  constexpr int kDrives = 10, kAround = 10;  // images before and after
   double sum = 0.0;
   int count = 0;
   for (int seed = 1; seed <= kDrives; ++seed) {
@@ -230,23 +228,23 @@ double passing_nees(bool stereo, double noise_px, const Told& told) {
       Eigen::Vector3d mean = Eigen::Vector3d::Zero();
       for (size_t k = i - kAround; k <= i + kAround; ++k) mean += passed[k].error / (2 * kAround + 1);
       const Eigen::Vector3d e = passed[i].error - mean;
-      sum += e.dot(told(passed[i]).ldlt().solve(e)) / 3.0;
+      sum += e.dot(configured(passed[i]).ldlt().solve(e)) / 3.0;
       ++count;
     }
   }
   return sum / count;
 }
 
-TEST_CASE("what one picture and its map have wrong for a while is told", "[statistics]") {
-  const auto all = [](const Passed& p) -> Eigen::Matrix3d { return p.picture + p.map; };
-  const auto picture = [](const Passed& p) -> Eigen::Matrix3d { return p.picture; };
+TEST_CASE("the covariance of image and map errors that do not accumulate is consistent", "[statistics]") {
+  const auto all = [](const Passed& p) -> Eigen::Matrix3d { return p.image + p.map; };
+  const auto image = [](const Passed& p) -> Eigen::Matrix3d { return p.image; };
   const auto constant = [](const Passed&) -> Eigen::Matrix3d {
     return Eigen::Vector3d(0.005, 0.005, 1e-3).cwiseAbs2().asDiagonal();
   };
   std::vector<double> constants;
   for (const bool stereo : {true, false}) {
     for (const double noise_px : {0.15, 0.6}) {
-      const double nees = passing_nees(stereo, noise_px, all), without_map = passing_nees(stereo, noise_px, picture);
+      const double nees = passing_nees(stereo, noise_px, all), without_map = passing_nees(stereo, noise_px, image);
       constants.push_back(passing_nees(stereo, noise_px, constant));
       std::printf("passing, %s %.2f px: nees %.2f, of the picture alone %.2f, of constants %.2f\n",
                   stereo ? "stereo" : "mono", noise_px, nees, without_map, constants.back());
@@ -257,23 +255,26 @@ TEST_CASE("what one picture and its map have wrong for a while is told", "[stati
   }
 }
 
-TEST_CASE("a right picture that lies a third of a pixel off is found out by the motion") {
-  const double doubt = KeyframeTrackerConfig{}.right_turn_std_deg;
+TEST_CASE("a right image shifted by a third of a pixel is estimated from motion") {
+  const double sigma_deg = KeyframeTrackerConfig{}.right_turn_std_deg;
   for (const double shift_px : {-0.3, 0.3}) {
     const Drives exact = drives(3, true, 0.3),
-                 learnt = drives(3, true, 0.3, {.right_shift_px = shift_px, .right_turn_std_deg = doubt}),
+                 learnt = drives(3, true, 0.3, {.right_shift_px = shift_px, .right_turn_std_deg = sigma_deg}),
                  believed = drives(3, true, 0.3, {.right_shift_px = shift_px});
     std::printf("right picture %+.1f px off: error %.3f m, %.3f m where the calibration is believed, %.3f m without\n",
                 shift_px, learnt.error, believed.error, exact.error);
-    CHECK(learnt.error < 0.25 * believed.error);  // teeth: the same drive, the calibration believed
+    CHECK(learnt.error < 0.25 * believed.error);  // teeth: the same drive with the calibration fixed
     CHECK(believed.error > 1.0);
   }
 }
 
-TEST_CASE("stereo that loses an eye before a bend keeps its lengths in it") {
-  const Calibrated told{
-      .focal_error = 0.02, .doubt = CameraRig{}.doubt, .focal_std = 0.01, .right_until = 30, .sharpness = 2.0};
-  Calibrated believed = told, wheels = told, both = told;
+TEST_CASE("stereo that loses its right camera before a bend keeps its scale") {
+  const Calibrated configured{.focal_error = 0.02,
+                              .scale_sigmas = CameraRig{}.scale_sigmas,
+                              .focal_std = 0.01,
+                              .right_until = 30,
+                              .sharpness = 2.0};
+  Calibrated believed = configured, wheels = configured, both = configured;
   believed.focal_std = 0.0;
   wheels.wheels = true;
   both.right_until = kFrames;
@@ -284,7 +285,7 @@ TEST_CASE("stereo that loses an eye before a bend keeps its lengths in it") {
     }
     return sum;
   };
-  const double with_both = stretch(both), learnt = stretch(told), by_wheels = stretch(wheels);
+  const double with_both = stretch(both), learnt = stretch(configured), by_wheels = stretch(wheels);
   const double as_told = stretch(believed);
   std::printf(
       "right eye lost, focal length 2 %% off: lengths %.4f off after the bend, %.4f with wheels; %.4f with the lens "

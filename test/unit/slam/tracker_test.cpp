@@ -1,4 +1,4 @@
-/// The whole tracker on a small made-up street.
+/// The whole tracker on a small synthetic street.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <cstring>
@@ -14,7 +14,7 @@ namespace {
 const CameraIntrinsics kLens{480, 160, 280.0, 280.0, 240.0, 80.0, Distortion::kNone, {}};
 constexpr int kFrames = 40;
 
-/// A drive: 0.8 m a frame, then a bend.
+/// A drive: 0.8 m per frame, then a bend.
 SE3 true_pose(int frame) {
   SE3 T;
   for (int i = 0; i < frame; ++i) T = T * SE3{exp_q({0.0, i > 15 ? 0.02 : 0.0, 0.0}), {0.0, 0.0, 0.8}};
@@ -31,7 +31,7 @@ CameraRig rig(bool stereo) {
   return r;
 }
 
-/// Every picture of the drive, made once.
+/// Every image of the drive, rendered once.
 const std::vector<CameraFrame>& drive() {
   static const std::vector<CameraFrame> kDrive = [] {
     fix_eigen_blocking();
@@ -41,8 +41,8 @@ const std::vector<CameraFrame>& drive() {
     for (int i = 0; i < kFrames; ++i) {
       const SE3 T = true_pose(i);
       const auto seed = static_cast<unsigned>(2 * i + 1);
-      frames.push_back({100'000 * (i + 1), street.picture(T, kLens, 2.0, seed),
-                        street.picture(T * rig(true).T_right_left.inverse(), kLens, 2.0, seed + 1)});
+      frames.push_back({100'000 * (i + 1), street.image(T, kLens, 2.0, seed),
+                        street.image(T * rig(true).T_right_left.inverse(), kLens, 2.0, seed + 1)});
     }
     return frames;
   }();
@@ -56,7 +56,7 @@ struct Run {
       : tracker(config, rig(stereo), make_front_end(config.front_end), executor) {}
 };
 
-TEST_CASE("stereo follows the drive to a percent") {
+TEST_CASE("stereo tracks the drive to one percent") {
   Run run(true);
   int valid = 0;
   for (const CameraFrame& frame : drive()) {
@@ -73,17 +73,17 @@ TEST_CASE("stereo follows the drive to a percent") {
   CHECK(run.tracker.last().reset_counter == 0);
 }
 
-TEST_CASE("stereo's covariance on pictures holds the error") {
+TEST_CASE("stereo covariance on images contains the error") {
   Run run(true);
   for (const CameraFrame& frame : drive()) run.tracker.process(frame);
   const Odometry& last = run.tracker.last().odometry;
-  SE3 scaled = last.T_frame_vehicle;  // the error of scale is common to the way and not in the covariance
+  SE3 scaled = last.T_frame_vehicle;  // the common scale error is not part of this covariance
   scaled.p *= true_pose(kFrames - 1).p.norm() / scaled.p.norm();
   const Vector6d shape = local(scaled, true_pose(kFrames - 1));
   CHECK(shape.dot(last.cov_pose.ldlt().solve(shape)) < 6.0 * 6.0);
 }
 
-TEST_CASE("mono follows the drive up to scale, and to scale where the wheels tell") {
+TEST_CASE("mono tracks the drive up to scale, and metrically with wheels") {
   for (const bool wheels : {false, true}) {
     Run run(false);
     SE3 first;
@@ -108,7 +108,7 @@ TEST_CASE("mono follows the drive up to scale, and to scale where the wheels tel
   }
 }
 
-/// After so many frames and a second of darkness the first picture comes again.
+/// After so many frames and a second of darkness the first image is shown again.
 TrackedFrame after_darkness(int frames) {
   Run run(true);
   for (int i = 0; i < frames; ++i) run.tracker.process(drive()[static_cast<size_t>(i)]);
@@ -121,7 +121,7 @@ TrackedFrame after_darkness(int frames) {
   return run.tracker.process(frame);
 }
 
-TEST_CASE("after a loss a known place is taken where the vehicle can have come to it, and only there") {
+TEST_CASE("after a loss only a place within reach is used to relocalise") {
   const TrackedFrame near = after_darkness(6);
   CHECK(near.state == TrackState::kRelocalised);
   CHECK(near.reset_counter == 1);
@@ -129,10 +129,10 @@ TEST_CASE("after a loss a known place is taken where the vehicle can have come t
   const TrackedFrame far = after_darkness(25);  // 19 m from there, with 12 m within reach
   CHECK(far.state == TrackState::kGood);
   CHECK(far.reset_counter == 1);
-  CHECK((far.odometry.T_frame_vehicle.p - true_pose(24).p).norm() < 6.0);  // begun anew where it was lost
+  CHECK((far.odometry.T_frame_vehicle.p - true_pose(24).p).norm() < 6.0);  // restarted where it was lost
 }
 
-TEST_CASE("descriptors, half of which the next picture finds, make no more keyframes than the way asks for") {
+TEST_CASE("descriptors with a redetection rate of one half cause no extra keyframes") {
   const auto keyframes = [](FrontEndKind kind, double share) {
     KeyframeTrackerConfig config;
     config.front_end.kind = kind;
@@ -144,11 +144,11 @@ TEST_CASE("descriptors, half of which the next picture finds, make no more keyfr
   const double share = KeyframeTrackerConfig{}.keyframe_min_share;
   const int64_t flow = keyframes(FrontEndKind::kKlt, share), orb = keyframes(FrontEndKind::kOrb, share);
   std::printf("keyframes of %d frames: %ld with flow, %ld with ORB\n", kFrames, flow, orb);
-  CHECK(2 * std::max(flow, orb) < kFrames);  // 32 and 40 where a keyframe's own landmarks were the measure
-  CHECK(2 * keyframes(FrontEndKind::kOrb, 1.0) > kFrames);  // teeth: asked for all that it usually finds
+  CHECK(2 * std::max(flow, orb) < kFrames);  // 32 and 40 with the landmarks of the keyframe itself as the reference
+  CHECK(2 * keyframes(FrontEndKind::kOrb, 1.0) > kFrames);  // teeth: with a rate of one
 }
 
-TEST_CASE("a lost mono tracker begins again, also where most of its tracks leave the picture") {
+TEST_CASE("a lost monocular tracker restarts while most tracks leave the image") {
   Run run(false);
   int64_t t_us = 0;
   const auto show = [&](const cv::Mat& left) { return run.tracker.process({t_us += 100'000, left, {}}); };
@@ -161,12 +161,12 @@ TEST_CASE("a lost mono tracker begins again, also where most of its tracks leave
     const TrackedFrame out = show(drive()[static_cast<size_t>(i)].left);
     if (out.odometry.validity == Validity::kValid) begun = i;
   }
-  CHECK(begun > 12);  // it took until 24 and longer, as half the tracks were gone before the others had moved enough
+  CHECK(begun > 12);  // formerly at 24 and later, when half of the tracks had ended before the others had moved enough
   CHECK(begun < 18);
   CHECK(run.tracker.last().reset_counter == 1);
 }
 
-TEST_CASE("bad pictures are survived and called by name") {
+TEST_CASE("bad images are handled and named") {
   Run run(true);
   const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1), white = black + 255;
   for (int i = 0; i < kFrames; ++i) {
@@ -191,7 +191,7 @@ TEST_CASE("bad pictures are survived and called by name") {
   CHECK(run.tracker.last().reset_counter == 0);
 }
 
-TEST_CASE("a frozen picture looks like standing, and what follows is right or a jump that is counted") {
+TEST_CASE("a frozen image counts as standstill; what follows is right or a counted jump") {
   Run run(true);
   for (int i = 0; i < kFrames; ++i) {
     CameraFrame frame = drive()[static_cast<size_t>(i)];
@@ -208,7 +208,7 @@ TEST_CASE("a frozen picture looks like standing, and what follows is right or a 
   CHECK((error.head<3>().norm() < 0.02 * 0.8 * kFrames || last.reset_counter > 0));
 }
 
-TEST_CASE("darkness ends in lost within half a second, and a restart takes the pose given") {
+TEST_CASE("darkness ends in lost within 0.5 s; a restart takes the given pose") {
   Run run(true);
   const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1);
   for (int i = 0; i < 20; ++i) {
@@ -226,18 +226,18 @@ TEST_CASE("darkness ends in lost within half a second, and a restart takes the p
   CHECK(run.tracker.last().reset_counter > 0);
   const Vector6d error = local(run.tracker.last().odometry.T_frame_vehicle, true_pose(kFrames - 1));
   CHECK(error.head<3>().norm() < 0.3);
-  CHECK(run.tracker.last().odometry.cov_pose(2, 2) > 0.01);  // what the restart's own pose was worth stays in it
+  CHECK(run.tracker.last().odometry.cov_pose(2, 2) > 0.01);  // contains the covariance of the restart pose
 }
 
-TEST_CASE("standing still adds no drift") {
+TEST_CASE("a standstill adds no drift") {
   Run run(true);
   const test::Street street(3);
   for (int i = 0; i < 3; ++i) (void)run.tracker.process(drive()[static_cast<size_t>(i)]);
   const SE3 before = run.tracker.last().odometry.T_frame_vehicle;
   for (int i = 0; i < 40; ++i) {
     const auto seed = static_cast<unsigned>(1000 + i);
-    CameraFrame frame{300'000 + 100'000 * (i + 1), street.picture(true_pose(2), kLens, 2.0, seed), {}};
-    frame.right = street.picture(true_pose(2) * rig(true).T_right_left.inverse(), kLens, 2.0, seed + 500);
+    CameraFrame frame{300'000 + 100'000 * (i + 1), street.image(true_pose(2), kLens, 2.0, seed), {}};
+    frame.right = street.image(true_pose(2) * rig(true).T_right_left.inverse(), kLens, 2.0, seed + 500);
     (void)run.tracker.process(frame);
   }
   CHECK((run.tracker.last().odometry.T_frame_vehicle.p - before.p).norm() < 0.03);

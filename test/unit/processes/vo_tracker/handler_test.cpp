@@ -1,4 +1,4 @@
-/// The tracker as a stage, on a small made-up street.
+/// The tracker as a stage, on a small synthetic street.
 #include "vo_tracker/handler.h"
 
 #include <catch2/catch.hpp>
@@ -18,8 +18,8 @@ namespace {
 
 using namespace test;
 
-TEST_CASE("a pose, a status and the features come with every frame, for now") {
-  const Collector out = run(pictures(), true);
+TEST_CASE("each frame gives a pose, a status and features") {
+  const Collector out = run(images(), true);
   const auto poses = out.all<pose_t>("POSE_VO");
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
   const auto features = out.all<vo_features2_t>("VO_FEATURES");
@@ -32,12 +32,12 @@ TEST_CASE("a pose, a status and the features come with every frame, for now") {
   CHECK(last.frame == pose_t::FRAME_LOCAL);
   CHECK(last.origin == pose_t::ORIGIN_REAR_AXLE);
   CHECK(last.scale == pose_t::SCALE_METRIC);
-  CHECK(last.position_m[0] == Approx(travelled(kFrames)).epsilon(0.03));  // 0.05 deg of the right eye are 3 % here
+  CHECK(last.position_m[0] == Approx(travelled(kFrames)).epsilon(0.03));  // 0.05 deg of the right camera are 3 % here
   CHECK(std::abs(last.position_m[1]) < 0.5);
   CHECK(std::abs(last.velocity_mps[0]) < 0.1);
   CHECK(poses[40].velocity_mps[0] == Approx(8.0).epsilon(0.05));
   CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
-  const auto closed = out.all<pose_t>("POSE_VO_MAP");  // no loop on a straight way: the same pose
+  const auto closed = out.all<pose_t>("POSE_VO_MAP");  // no loop on a straight drive: the same pose
   REQUIRE(closed.size() == kFrames);
   CHECK(closed.back().position_m[0] == Approx(last.position_m[0]).margin(0.01));
   CHECK(statuses.back().num_loops_closed == closed.back().reset_counter);
@@ -50,14 +50,14 @@ TEST_CASE("a pose, a status and the features come with every frame, for now") {
   CHECK(features.back().num_features == statuses.back().num_features);
 }
 
-TEST_CASE("tracks come in ascending order with their noise, and with the right eye's place where a keyframe looked") {
+TEST_CASE("tracks come in ascending order with their noise, and with the right pixel at keyframes") {
   for (const bool stereo : {true, false}) {
-    const Collector out = run(pictures(), stereo);
+    const Collector out = run(images(), stereo);
     size_t seen = 0, ahead = 0;
     for (const vo_features2_t& m : out.all<vo_features2_t>("VO_FEATURES")) {
-      const TrackPicture picture = track_picture(m);
-      CHECK(picture.tracks.size() == static_cast<size_t>(m.num_features));  // all of them are measurements
-      for (const TrackSighting& s : picture.tracks) {
+      const TrackPicture image = track_picture(m);
+      CHECK(image.tracks.size() == static_cast<size_t>(m.num_features));  // all of them are measurements
+      for (const TrackSighting& s : image.tracks) {
         if (!s.right) continue;
         ++seen;
         ahead += s.right->x() < s.left.x() ? 1 : 0;
@@ -68,18 +68,19 @@ TEST_CASE("tracks come in ascending order with their noise, and with the right e
   }
 }
 
-TEST_CASE("one thread or two, late wheels or punctual ones: the same bytes") {
-  const Collector one = run(with_wheels(pictures(), 0), false);
+TEST_CASE("one thread or two, wheels late or in time: the same bytes") {
+  const Collector one = run(with_wheels(images(), 0), false);
   for (const int count : {2, 1, 2, 2}) {  // with the first, five runs
-    CHECK(same_outputs(one, run(with_wheels(pictures(), 45'000), false, threads(count))));
+    CHECK(same_outputs(one, run(with_wheels(images(), 45'000), false, threads(count))));
   }
-  CHECK_FALSE(same_outputs(one, run(with_wheels(pictures(), 400'000), false)));  // teeth: too late counts as not there
-  const Collector stereo = run(pictures(), true);
-  for (const int count : {2, 1, 2, 2}) CHECK(same_outputs(stereo, run(pictures(), true, threads(count))));
+  CHECK_FALSE(same_outputs(one, run(with_wheels(images(), 400'000), false)));  // teeth: beyond the lateness they are
+                                                                               // refused
+  const Collector stereo = run(images(), true);
+  for (const int count : {2, 1, 2, 2}) CHECK(same_outputs(stereo, run(images(), true, threads(count))));
 }
 
-TEST_CASE("a restart takes effect half a second after its time, on whatever frame comes then") {
-  std::vector<Sent> all = pictures();
+TEST_CASE("a restart takes effect half a second after its time, at the next frame") {
+  std::vector<Sent> all = images();
   vo_restart_t m{};
   m.restart_position_m[0] = 500.0;
   m.restart_q_wxyz[0] = 1.0;
@@ -97,21 +98,21 @@ TEST_CASE("a restart takes effect half a second after its time, on whatever fram
   CHECK(poses[25].reset_delta_m[0] == Approx(poses[25].position_m[0] - poses[24].position_m[0]).margin(2.0));
 
   all.back().arrival_us = 0;
-  std::vector<Sent> late = pictures();  // asked for too late: in the ledger, and unused
+  std::vector<Sent> late = images();  // requested too late: in the ledger, unused
   late.insert(late.begin() + std::ptrdiff_t{2} * 30, sent("VO_RESTART", kFrame_us * 20, 0, m));
   const Collector out = run(late, true);
   CHECK(out.all<pose_t>("POSE_VO").back().reset_counter == 0);
   CHECK(out.messages.contains("LEDGER_VO_TRACKER"));
 }
 
-TEST_CASE("lost, corrupt and blank pictures are survived and named") {
-  std::vector<Sent> all = pictures();
+TEST_CASE("lost, corrupt and blank images are handled and named") {
+  std::vector<Sent> all = images();
   image_t broken = decode<image_t>(all[std::size_t{2} * 20].bytes);
   std::fill(broken.data.begin() + 40, broken.data.end(), uint8_t{0x55});
   all[std::size_t{2} * 20].bytes = encode(broken);
   all[std::size_t{2} * 30].bytes =
       sent("CAMERA_LEFT", kFrame_us * 31, 30, picture_message(cv::Mat::zeros(kHeight, kWidth, CV_8UC1))).bytes;
-  all.erase(all.begin() + std::ptrdiff_t{2} * 40);  // a left picture
+  all.erase(all.begin() + std::ptrdiff_t{2} * 40);  // a left image
   all.erase(all.begin() + std::ptrdiff_t{2} * 50);  // a right one, by now at this place
   const Collector out = run(all, true);
   const auto poses = out.all<pose_t>("POSE_VO");
@@ -123,13 +124,13 @@ TEST_CASE("lost, corrupt and blank pictures are survived and named") {
   CHECK(poses.back().validity == pose_t::VALIDITY_VALID);
   CHECK(poses.back().position_m[0] == Approx(travelled(kFrames)).epsilon(0.03));
   CHECK(poses[40].utime == kFrame_us * 41);
-  CHECK(poses[40].validity == pose_t::VALIDITY_COASTING);  // carried on over the missing picture
+  CHECK(poses[40].validity == pose_t::VALIDITY_COASTING);  // extrapolated over the missing image
   CHECK(poses[40].position_m[0] - poses[39].position_m[0] == Approx(kStep).margin(0.2));
 }
 
-TEST_CASE("the left camera goes on alone when the right one falls silent") {
+TEST_CASE("the left camera continues alone when the right one falls silent") {
   std::vector<Sent> all;
-  for (const Sent& m : pictures()) {
+  for (const Sent& m : images()) {
     if (m.channel == "CAMERA_LEFT" || m.arrival_us < kFrame_us * 30) all.push_back(m);
   }
   const auto poses = run(all, true).all<pose_t>("POSE_VO");
@@ -138,9 +139,9 @@ TEST_CASE("the left camera goes on alone when the right one falls silent") {
   CHECK(poses.back().position_m[0] == Approx(travelled(kFrames)).epsilon(0.05));
 }
 
-TEST_CASE("a snapshot taken on the way goes on with the same bytes") {
+TEST_CASE("a snapshot restored mid-drive continues with the same bytes") {
   for (const bool stereo : {true, false}) {
-    const std::vector<Sent> all = stereo ? pictures() : with_wheels(pictures(), 0);
+    const std::vector<Sent> all = stereo ? images() : with_wheels(images(), 0);
     Collector whole;
     StageRunner runner(make_vo_tracker(calibration(stereo), threads(2)), whole);
     for (const Sent& m : all) feed(runner, m);
@@ -161,7 +162,7 @@ TEST_CASE("a snapshot taken on the way goes on with the same bytes") {
   }
 }
 
-TEST_CASE("a window without a middle is refused with its file, line and value") {
+TEST_CASE("an even window size is refused with its file, line and value") {
   const auto parsed = [](const std::string& group, const std::string& key, int value) {
     const std::string text = "keyframe:\n  " + group + ":\n    " + key + ": " + std::to_string(value) + "\n";
     return parse_config<VoTrackerConfig>(text, "vo_tracker.yaml");
@@ -174,7 +175,7 @@ TEST_CASE("a window without a middle is refused with its file, line and value") 
   }
 }
 
-TEST_CASE("a mode that is left open follows the sensors: lengths from the IMU where there are no others") {
+TEST_CASE("the automatic mode follows the sensors: lengths from the IMU without other sources") {
   Calibration c = calibration(false);
   const auto clock_of = [&](const VoTrackerConfig& config) {
     const auto stage = make_vo_tracker(c, config);
@@ -193,7 +194,7 @@ TEST_CASE("a mode that is left open follows the sensors: lengths from the IMU wh
   c.sensors.wheels.reset();
   c.sensors.camera_right = calibration(true).sensors.camera_right;
   CHECK(clock_of({}) == "CAMERA_RIGHT");
-  // A rig on its side: only gravity tells what is up, and the keyframe tracker does not feel it.
+  // A rig on its side: only gravity gives the vertical, which the keyframe tracker does not measure.
   c.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d(10.0, 10.0, 180.0)};
   CHECK(clock_of({}) == "CAMERA_RIGHT");
   c.mounting->std_deg = Eigen::Vector3d::Constant(180.0);
@@ -202,7 +203,7 @@ TEST_CASE("a mode that is left open follows the sensors: lengths from the IMU wh
   CHECK(clock_of({}) == "CAMERA_RIGHT");
 }
 
-TEST_CASE("what the calibration lacks is named at the start") {
+TEST_CASE("missing calibration entries are named at the start") {
   Calibration c = calibration(true);
   c.sensors.camera_right->mounting.reset();
   CHECK_THROWS_WITH(make_vo_tracker(c, {}), Catch::Contains("sensors.camera_right.T_body_camera"));

@@ -1,4 +1,4 @@
-/// Mode msckf as a stage: pictures of a small made-up street, an imu that moves along it.
+/// Mode msckf as a stage: images of a small synthetic street and an IMU moving along it.
 #include <catch2/catch.hpp>
 #include <roadfix/imu_t.hpp>
 #include <roadfix/ledger_t.hpp>
@@ -26,7 +26,7 @@ const CameraIntrinsics kLens{480, 160, 280.0, 280.0, 240.0, 80.0, Distortion::kN
 
 double seconds(int64_t t_us) { return 1e-6 * static_cast<double>(t_us); }
 double speed_at(double t) { return std::clamp(kAcceleration * (t - kStand_s), 0.0, kSpeed); }
-double way_at(double t) {
+double distance_at(double t) {
   const double moving = std::max(0.0, t - kStand_s), rising = std::min(moving, kSpeed / kAcceleration);
   return 0.5 * kAcceleration * rising * rising + kSpeed * (moving - rising);
 }
@@ -44,15 +44,15 @@ Calibration calibration() {
   return c;
 }
 
-/// Pictures up to `late_us` late, as they arrive.
+/// Images up to `late_us` late, in order of arrival.
 std::vector<Sent> drive(int64_t late_us) {
   static const std::vector<image_t> kPictures = [] {
     fix_eigen_blocking();
     std::vector<image_t> all;
     const Street street(3);
     for (int64_t t = kFrame_us; t < kEnd_us; t += kFrame_us) {
-      const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, way_at(seconds(t))}};
-      all.push_back(picture_message(street.picture(left, kLens, 2.0, static_cast<unsigned>(t / kFrame_us))));
+      const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, distance_at(seconds(t))}};
+      all.push_back(picture_message(street.image(left, kLens, 2.0, static_cast<unsigned>(t / kFrame_us))));
     }
     return all;
   }();
@@ -62,7 +62,7 @@ std::vector<Sent> drive(int64_t late_us) {
     const double dt = seconds(kImu_us);
     m.accel_mps2[0] = (speed_at(seconds(t)) - speed_at(seconds(t - kImu_us))) / dt;
     m.accel_mps2[2] = kGravity;
-    m.gyro_radps[1] = 1e-4 * ((t / kImu_us) % 3 == 0 ? 1.0 : -0.5);  // no sensor is quite still
+    m.gyro_radps[1] = 1e-4 * ((t / kImu_us) % 3 == 0 ? 1.0 : -0.5);  // sensor noise
     all.push_back(sent("IMU", t, t / kImu_us, m));
   }
   for (size_t i = 0; i < kPictures.size(); ++i) {
@@ -86,7 +86,7 @@ Collector run(const std::vector<Sent>& messages, const VoTrackerConfig& with = c
   return sink;
 }
 
-TEST_CASE("mode msckf: the calibration tells where the axle is and how the imu is mounted") {
+TEST_CASE("mode msckf: the calibration gives the lever arm of the axle and the mounting of the imu") {
   const MsckfVehicle silent = msckf_vehicle(calibration());
   CHECK(silent.p_imu_axle.isZero(0.0));
   CHECK(silent.p_imu_axle_std.isZero(0.0));
@@ -97,7 +97,7 @@ TEST_CASE("mode msckf: the calibration tells where the axle is and how the imu i
   CHECK(msckf_vehicle(told).p_imu_axle_std == Eigen::Vector3d(1.0, 0.5, 0.5));
   CHECK(msckf_vehicle(told).axle_std == 0.0);
   told.sensors.wheels->lever_arm = Eigen::Vector3d(-1.2, -0.4, -0.8);
-  told.mounting.emplace().angles_deg = Eigen::Vector3d(0.0, 2.0, 3.0);  // the imu's nose down and to the left
+  told.mounting.emplace().angles_deg = Eigen::Vector3d(0.0, 2.0, 3.0);  // the IMU pitched down and yawed to the left
   const MsckfVehicle v = msckf_vehicle(told);
   CHECK(v.p_imu_axle == Eigen::Vector3d(-1.2, -0.4, -0.8));
   CHECK(v.p_imu_axle_std == Eigen::Vector3d::Constant(0.05));
@@ -113,7 +113,7 @@ TEST_CASE("mode msckf: the calibration tells where the axle is and how the imu i
   CHECK(msckf_vehicle(told).axle_std == 0.0);
 }
 
-TEST_CASE("mode msckf: a calibration silent about the camera's clock leaves it in doubt, one that tells it does not") {
+TEST_CASE("mode msckf: the camera time offset is estimated unless it is calibrated") {
   Calibration c = calibration();
   CHECK(msckf_vehicle(c).time_offset_std == kSilentClockStd);
   for (const double told : {0.0, 0.002, 0.3}) {
@@ -122,7 +122,7 @@ TEST_CASE("mode msckf: a calibration silent about the camera's clock leaves it i
   }
 }
 
-TEST_CASE("mode msckf: valid while parked, then follows the street") {
+TEST_CASE("mode msckf: valid while parked, then tracks the street") {
   const Collector out = run(drive(0));
   const auto poses = out.all<pose_t>("POSE_VO");
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
@@ -130,7 +130,7 @@ TEST_CASE("mode msckf: valid while parked, then follows the street") {
   const auto first =
       std::find_if(poses.begin(), poses.end(), [](const pose_t& p) { return p.validity == pose_t::VALIDITY_VALID; });
   REQUIRE(first != poses.end());
-  CHECK(first->utime <= 1'000'000 + 200'000);  // pictures are waited for 200 ms
+  CHECK(first->utime <= 1'000'000 + 200'000);  // the lateness of images is 200 ms
   for (const pose_t& p : poses) {
     if (p.utime > first->utime && seconds(p.utime) < kStand_s) CHECK(std::abs(p.position_m[0]) < 0.01);
     if (p.utime >= first->utime) CHECK(p.validity == pose_t::VALIDITY_VALID);
@@ -138,8 +138,9 @@ TEST_CASE("mode msckf: valid while parked, then follows the street") {
   const pose_t& last = poses.back();
   CHECK(last.scale == pose_t::SCALE_METRIC);
   CHECK(last.origin == pose_t::ORIGIN_IMU);
-  CHECK(last.position_m[0] == Approx(way_at(seconds(last.utime))).epsilon(0.03));
-  CHECK(last.velocity_mps[0] == Approx(kSpeed).epsilon(0.08));  // no turn and no wheel has told the scale yet
+  CHECK(last.position_m[0] == Approx(distance_at(seconds(last.utime))).epsilon(0.03));
+  CHECK(last.velocity_mps[0] == Approx(kSpeed).epsilon(0.08));  // the scale is not observed yet, without turn and
+                                                                // wheels
   CHECK(std::abs(last.velocity_mps[0] - kSpeed) < 4.0 * std::sqrt(last.cov_velocity_m2ps2[0][0]) + 0.1);
   CHECK(statuses.back().mode == vo_status_t::MODE_MSCKF);
   CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
@@ -148,23 +149,23 @@ TEST_CASE("mode msckf: valid while parked, then follows the street") {
   CHECK(out.messages.at("VO_FEATURES").size() == statuses.size());
 }
 
-TEST_CASE("mode msckf: the status names the front end, and its residuals are those of what is used") {
+TEST_CASE("mode msckf: the status names the front end and contains the residuals used") {
   VoTrackerConfig orb = config();
   orb.msckf.front_end.kind = FrontEndKind::kOrb;
-  orb.msckf.tuning.window.sigma_px = 0.2;  // far less than what the corners of ORB scatter by
+  orb.msckf.tuning.window.sigma_px = 0.2;  // far below the noise of ORB corners
   const auto statuses = run(drive(0), orb).all<vo_status_t>("VO_STATUS");
   REQUIRE(!statuses.empty());
   CHECK(statuses.back().front_end == "orb");
   int refusing = 0;
   for (const vo_status_t& s : statuses) {
     refusing += s.num_inliers > 0 && s.inlier_ratio < 0.9 ? 1 : 0;
-    // A gate of 95 % lets a residual of 2 sigma in, not the 10 of a wrong match.
+    // A gate of 95 % accepts a residual of 2 sigma, not the 10 of a wrong match.
     CHECK(s.reprojection_rms_px <= 2.0 * orb.msckf.tuning.window.sigma_px);
   }
   CHECK(refusing > 0);
 }
 
-TEST_CASE("mode msckf: pictures may come late, and a snapshot goes on with the same bytes") {
+TEST_CASE("mode msckf: late images and a restored snapshot give the same bits") {
   const std::vector<Sent> all = drive(0);
   const Collector whole = run(all), late = run(drive(190'000)), too_late = run(drive(900'000));
   CHECK(whole.messages.at("POSE_VO") == late.messages.at("POSE_VO"));
@@ -184,7 +185,7 @@ TEST_CASE("mode msckf: pictures may come late, and a snapshot goes on with the s
   CHECK_THROWS(stage->load(std::vector<uint8_t>{1, 2, 3}));
 }
 
-/// The drive with a restart asked for at `asked_us` that arrives `delay_us` later.
+/// The drive with a restart requested at `asked_us` that arrives `delay_us` later.
 Collector run_restarted(int64_t asked_us, double place, int64_t delay_us) {
   std::vector<Sent> all = drive(0);
   vo_restart_t m{};
@@ -197,12 +198,12 @@ Collector run_restarted(int64_t asked_us, double place, int64_t delay_us) {
   return run(all);
 }
 
-TEST_CASE("mode msckf: a restart takes effect half a second after its time, whenever it comes, and counts") {
+TEST_CASE("mode msckf: a restart takes effect half a second after its time and is counted") {
   constexpr int64_t kAsked_us = 8'030'000;
   constexpr double kPlace = 500.0;
   const Collector out = run_restarted(kAsked_us, kPlace, 0);
   const auto poses = out.all<pose_t>("POSE_VO");
-  const double gone = way_at(seconds(poses.back().utime)) - way_at(seconds(kAsked_us));
+  const double gone = distance_at(seconds(poses.back().utime)) - distance_at(seconds(kAsked_us));
   const pose_t* before = nullptr;
   const pose_t* after = nullptr;
   for (const pose_t& p : poses) {
@@ -214,13 +215,13 @@ TEST_CASE("mode msckf: a restart takes effect half a second after its time, when
   REQUIRE(after != nullptr);
   CHECK(before->utime < after->utime);
   CHECK(poses.back().reset_counter == 1);
-  // At the horizon, which is as late as pictures may be.
+  // At the horizon, which has the lateness of images.
   CHECK(after->utime == Approx(kAsked_us + 500'000 + 200'000).margin(40'000));
   CHECK(poses.back().position_m[0] == Approx(kPlace + gone).margin(0.8));
   CHECK(poses.back().cov_pose_m2_rad2[0][0] > 0.04);
   CHECK(after->reset_delta_m[0] == Approx(after->position_m[0] - before->position_m[0]).margin(0.5));
   CHECK(out.all<vo_status_t>("VO_STATUS").back().state == vo_status_t::STATE_GOOD);
-  // In time, the moment of its arrival does not show; later, it is not used and the ledger says so.
+  // In time, its arrival has no effect; later it is unused and in the ledger.
   CHECK(run_restarted(kAsked_us, kPlace, 450'000).messages.at("POSE_VO") == out.messages.at("POSE_VO"));
   const Collector late = run_restarted(kAsked_us, kPlace, 1'500'000);
   CHECK(late.all<pose_t>("POSE_VO").back().reset_counter == 0);
@@ -234,7 +235,7 @@ TEST_CASE("mode msckf: a restart takes effect half a second after its time, when
   CHECK_FALSE(entered(out));
 }
 
-TEST_CASE("mode msckf: a restart without numbers is refused, and the status says so") {
+TEST_CASE("mode msckf: a restart with NaN is refused and reported in the status") {
   const Collector out = run_restarted(8'030'000, std::numeric_limits<double>::quiet_NaN(), 0);
   int said = 0;
   for (const vo_status_t& s : out.all<vo_status_t>("VO_STATUS")) said += s.reason.find("restart") != std::string::npos;

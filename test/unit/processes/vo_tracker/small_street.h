@@ -1,4 +1,4 @@
-/// A hundred frames of a small made-up street as messages, and the tracker as a stage on them.
+/// A hundred frames of a small synthetic street as messages, and the tracker as a stage on them.
 #pragma once
 
 #include <roadfix/wheels_t.hpp>
@@ -15,7 +15,7 @@ constexpr int64_t kFrame_us = 100'000;
 
 inline const CameraIntrinsics kLens{kWidth, kHeight, kFocal, kFocal, 240.0, 80.0, Distortion::kNone, {}};
 
-/// A camera that looks along the vehicle's x, 1.2 m ahead of its origin.
+/// A camera along the vehicle's x, 1.2 m ahead of its origin.
 inline CameraMounting mounting(double y) { return {{1.2, y, 1.0}, {0.5, -0.5, 0.5, -0.5}, {}, {}}; }
 
 inline Calibration calibration(bool stereo) {
@@ -34,10 +34,10 @@ inline Calibration calibration(bool stereo) {
   return c;
 }
 
-/// Straight on for 60 frames, then standing.
+/// Straight for 60 frames, then a standstill.
 inline double travelled(int frame) { return kStep * std::min(frame, 60); }
 
-inline const std::vector<Sent>& pictures() {
+inline const std::vector<Sent>& images() {
   static const std::vector<Sent> kPictures = [] {
     fix_eigen_blocking();
     std::vector<Sent> all;
@@ -47,8 +47,8 @@ inline const std::vector<Sent>& pictures() {
       const auto seed = static_cast<unsigned>(2 * i + 1);
       const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, travelled(i)}};
       const SE3 right{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, travelled(i)}};
-      all.push_back(sent("CAMERA_LEFT", t, i, picture_message(street.picture(left, kLens, 2.0, seed))));
-      all.push_back(sent("CAMERA_RIGHT", t, i, picture_message(street.picture(right, kLens, 2.0, seed + 1))));
+      all.push_back(sent("CAMERA_LEFT", t, i, picture_message(street.image(left, kLens, 2.0, seed))));
+      all.push_back(sent("CAMERA_RIGHT", t, i, picture_message(street.image(right, kLens, 2.0, seed + 1))));
     }
     return all;
   }();

@@ -1,4 +1,4 @@
-/// What the stage says about itself, and what it can be told: VO_STATUS and VO_FEATURES, scale, stamps, a bad lens.
+/// VO_STATUS, VO_FEATURES and the options of the stage: scale, timestamps, a partly covered lens.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-/// INS poses at the pictures' times, from the frame `first` until the car stands.
+/// INS poses at the image times, from the frame `first` until the standstill.
 std::vector<Sent> with_ins(std::vector<Sent> all, int first, double sigma) {
   for (int i = first; i < 60; ++i) {
     pose_t m{};
@@ -34,9 +34,9 @@ std::vector<Sent> without_pictures_before(std::vector<Sent> all, int frame) {
   return all;
 }
 
-TEST_CASE("mono takes its scale from the wheels and says so") {
+TEST_CASE("mono takes its scale from the wheels and reports it") {
   for (const bool wheels : {false, true}) {
-    const Collector out = run(wheels ? with_wheels(pictures(), 0) : pictures(), false);
+    const Collector out = run(wheels ? with_wheels(images(), 0) : images(), false);
     const auto poses = out.all<pose_t>("POSE_VO");
     const auto status = out.all<vo_status_t>("VO_STATUS").back();
     CHECK(status.scale_source == (wheels ? vo_status_t::SCALE_FROM_WHEELS : vo_status_t::SCALE_FROM_NONE));
@@ -47,13 +47,13 @@ TEST_CASE("mono takes its scale from the wheels and says so") {
   }
 }
 
-TEST_CASE("what a calibration may have wrong for the whole way is in the covariance, and is told beside it") {
+TEST_CASE("common scale errors are part of the covariance and published beside it") {
   const auto drive = [](double scale_std, double focal_std) {
     Calibration c = calibration(true);
     c.sensors.stereo = StereoCalibration{scale_std, focal_std};
     Collector sink;
     StageRunner runner(make_vo_tracker(c, threads(1)), sink);
-    for (const Sent& m : pictures()) feed(runner, m);
+    for (const Sent& m : images()) feed(runner, m);
     return sink;
   };
   const Collector exact = drive(0.0, 0.0), doubted = drive(0.02, 0.01);
@@ -82,32 +82,32 @@ TEST_CASE("what a calibration may have wrong for the whole way is in the covaria
   CHECK(told.position_m[0] > 5.0);
 }
 
-TEST_CASE("what a picture and its map have wrong for a while is told beside the pose") {
-  const Collector out = run(pictures(), true);
+TEST_CASE("image and map errors that do not accumulate are published beside the pose") {
+  const Collector out = run(images(), true);
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
   const auto poses = out.all<pose_t>("POSE_VO");
   REQUIRE(statuses.size() == poses.size());
   for (const size_t i : {20u, 40u, 59u}) {
     REQUIRE(statuses[i].utime == poses[i].utime);
-    Matrix6d pose, picture, map;
+    Matrix6d pose, image, map;
     for (int r = 0; r < 6; ++r) {
       for (int c = 0; c < 6; ++c) {
         pose(r, c) = poses[i].cov_pose_m2_rad2[r][c];
-        picture(r, c) = statuses[i].cov_picture_m2_rad2[r][c];
+        image(r, c) = statuses[i].cov_picture_m2_rad2[r][c];
         map(r, c) = statuses[i].cov_map_m2_rad2[r][c];
       }
     }
-    CHECK(picture.llt().info() == Eigen::Success);
+    CHECK(image.llt().info() == Eigen::Success);
     CHECK(map.llt().info() == Eigen::Success);
-    const Matrix6d rest = pose - picture;  // the pose's contains the picture's
+    const Matrix6d rest = pose - image;  // the covariance of the pose contains that of the image
     CHECK(rest.llt().info() == Eigen::Success);
     CHECK(statuses[i].map_time_s > 0.5);
     CHECK(statuses[i].map_time_s < 3.0);
   }
 }
 
-TEST_CASE("INS speeds that come after the start give a running map its scale") {
-  const Collector out = run(with_ins(pictures(), 16, 0.1), false);
+TEST_CASE("INS speeds that arrive after the start set the scale of the map") {
+  const Collector out = run(with_ins(images(), 16, 0.1), false);
   const auto statuses = out.all<vo_status_t>("VO_STATUS");
   const auto poses = out.all<pose_t>("POSE_VO");
   CHECK(statuses[18].scale_source == vo_status_t::SCALE_FROM_NONE);  // 500 ms of delay are not over
@@ -116,25 +116,25 @@ TEST_CASE("INS speeds that come after the start give a running map its scale") {
   CHECK(poses[59].position_m[0] - poses[35].position_m[0] == Approx(24 * kStep).epsilon(0.03));
 }
 
-TEST_CASE("mono takes its scale from who knows it best, from whom it is told, or from nobody") {
+TEST_CASE("mono takes its scale from the better source, from the configured one, or from none") {
   const auto scaled = [](const std::vector<Sent>& messages, ScaleChoice choice) {
     VoTrackerConfig config = threads(1);
     config.keyframe.scale = choice;
     return run(messages, false, config);
   };
   const auto source = [](const Collector& out) { return out.all<vo_status_t>("VO_STATUS")[40].scale_source; };
-  const auto ins = without_pictures_before(with_ins(pictures(), 0, 0.05), 10);
+  const auto ins = without_pictures_before(with_ins(images(), 0, 0.05), 10);
   const Collector out = scaled(ins, ScaleChoice::kAuto);
   const auto poses = out.all<pose_t>("POSE_VO");
   CHECK(source(out) == vo_status_t::SCALE_FROM_INS);
   CHECK(poses[40].scale == pose_t::SCALE_METRIC);
-  CHECK(poses[40].reset_counter == 1);  // half a second after the map's begin, as all feedback
+  CHECK(poses[40].reset_counter == 1);  // half a second after the start of the map, as all feedback
   CHECK(poses[40].position_m[0] - poses[20].position_m[0] == Approx(20 * kStep).epsilon(0.03));
   CHECK(out.all<vo_status_t>("VO_STATUS")[40].scale_std == Approx(0.05 / 8.0).epsilon(0.01));
-  // Wheels know 2 %, the INS 0.6 % or 6 %.
+  // Relative sigmas: wheels 2 %, the INS 0.6 % or 6 %.
   CHECK(source(scaled(with_wheels(ins, 0), ScaleChoice::kAuto)) == vo_status_t::SCALE_FROM_INS);
   CHECK(source(scaled(with_wheels(ins, 0), ScaleChoice::kWheels)) == vo_status_t::SCALE_FROM_WHEELS);
-  const auto vague = without_pictures_before(with_ins(with_wheels(pictures(), 0), 0, 0.5), 10);
+  const auto vague = without_pictures_before(with_ins(with_wheels(images(), 0), 0, 0.5), 10);
   CHECK(source(scaled(vague, ScaleChoice::kAuto)) == vo_status_t::SCALE_FROM_WHEELS);
   CHECK(source(scaled(vague, ScaleChoice::kIns)) == vo_status_t::SCALE_FROM_INS);
   const Collector none = scaled(with_wheels(ins, 0), ScaleChoice::kNone);
@@ -142,10 +142,11 @@ TEST_CASE("mono takes its scale from who knows it best, from whom it is told, or
   CHECK(none.all<pose_t>("POSE_VO").back().scale == pose_t::SCALE_UNKNOWN);
 }
 
-/// Paper A's figures 5 to 7: matches and inliers per picture, and which feature is which.
-TEST_CASE("the status counts what the features show, in every picture") {
+/// Figures 5 to 7 of paper A: matches and inliers per image, and the class of each
+/// feature.
+TEST_CASE("the status counts the published features of every image") {
   for (const bool stereo : {true, false}) {
-    const Collector out = run(pictures(), stereo);
+    const Collector out = run(images(), stereo);
     const auto statuses = out.all<vo_status_t>("VO_STATUS");
     const auto features = out.all<vo_features2_t>("VO_FEATURES");
     REQUIRE(statuses.size() == features.size());
@@ -166,11 +167,11 @@ TEST_CASE("the status counts what the features show, in every picture") {
       outliers += outlier;
     }
     CHECK(judged_pictures > 90);
-    CHECK(outliers > 10);  // teeth: there was something to tell apart
+    CHECK(outliers > 10);  // teeth: there were outliers
   }
 }
 
-/// Root mean square of the speed's error while the car drives at 8 m/s.
+/// RMS speed error while the car drives at 8 m/s.
 double speed_error(const Collector& out) {
   const auto poses = out.all<pose_t>("POSE_VO");
   double sum = 0.0;
@@ -178,17 +179,17 @@ double speed_error(const Collector& out) {
   return std::sqrt(sum / 40.0);
 }
 
-TEST_CASE("stamps that jitter are put on the device's beat where the configuration asks for it") {
+TEST_CASE("jittering timestamps are smoothed where configured") {
   std::mt19937 random(5);
   std::uniform_int_distribution<int64_t> late(0, 30'000);
   std::vector<Sent> all;
-  for (size_t i = 0; i + 1 < pictures().size(); i += 2) {
+  for (size_t i = 0; i + 1 < images().size(); i += 2) {
     const int64_t delay_us = late(random);
     for (const size_t k : {i, i + 1}) {
-      Sent m = pictures()[k];
-      image_t picture = decode<image_t>(m.bytes);
-      picture.utime += delay_us;
-      all.push_back({m.arrival_us + delay_us, m.channel, encode(picture)});
+      Sent m = images()[k];
+      image_t image = decode<image_t>(m.bytes);
+      image.utime += delay_us;
+      all.push_back({m.arrival_us + delay_us, m.channel, encode(image)});
     }
   }
   VoTrackerConfig config = threads(1);
@@ -198,17 +199,17 @@ TEST_CASE("stamps that jitter are put on the device's beat where the configurati
   const Collector filtered = run(all, true, config);
   CHECK(speed_error(raw) > 0.5);  // teeth
   CHECK(speed_error(filtered) < 0.3 * speed_error(raw));
-  CHECK(filtered.all<pose_t>("POSE_VO").back().utime == all.back().arrival_us);  // poses are for the clock's time
-  CHECK(same_outputs(run(pictures(), true), run(pictures(), true, config)));     // stamps that are even stay
+  CHECK(filtered.all<pose_t>("POSE_VO").back().utime == all.back().arrival_us);  // poses are at the clock's time
+  CHECK(same_outputs(run(images(), true), run(images(), true, config)));         // regular stamps are unchanged
 }
 
-TEST_CASE("a lens half covered for good is driven with, and so is one with a picture in ten torn") {
-  std::vector<Sent> half = pictures(), torn = pictures();
+TEST_CASE("a half covered lens and an image in ten torn are tolerated") {
+  std::vector<Sent> half = images(), torn = images();
   for (size_t i = 20; i < half.size(); ++i) {
     image_t m = decode<image_t>(half[i].bytes);
-    cv::Mat picture = cv::imdecode(m.data, cv::IMREAD_GRAYSCALE);
-    picture.colRange(0, kWidth / 2).setTo(90);
-    cv::imencode(".png", picture, m.data);
+    cv::Mat image = cv::imdecode(m.data, cv::IMREAD_GRAYSCALE);
+    image.colRange(0, kWidth / 2).setTo(90);
+    cv::imencode(".png", image, m.data);
     m.size_bytes = static_cast<int32_t>(m.data.size());
     half[i].bytes = encode(m);
   }

@@ -1,4 +1,4 @@
-/// Messages to a stage under test, and what it says to them.
+/// Messages to a stage under test, and its outputs.
 #pragma once
 
 #include <opencv2/imgcodecs.hpp>
@@ -24,12 +24,12 @@ Sent sent(const std::string& channel, int64_t utime, int64_t seq, T message, int
   return {utime + delay_us, channel, encode(message)};
 }
 
-inline image_t picture_message(const cv::Mat& picture) {
+inline image_t picture_message(const cv::Mat& image) {
   image_t m{};
-  m.width_px = picture.cols;
-  m.height_px = picture.rows;
+  m.width_px = image.cols;
+  m.height_px = image.rows;
   m.format = image_t::FORMAT_PNG;
-  cv::imencode(".png", picture, m.data);
+  cv::imencode(".png", image, m.data);
   m.size_bytes = static_cast<int32_t>(m.data.size());
   return m;
 }

@@ -1,4 +1,4 @@
-/// One eye without speeds loses its scale on the way, and does not know what a metre is. Does it say so?
+/// Monocular scale drift without speeds, and the unknown unit of length: consistency.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
@@ -8,7 +8,7 @@
 namespace roadfix {
 namespace {
 
-/// One valid pose of a drive beside the truth.
+/// One valid pose and the ground truth.
 struct Told {
   SE3 T_frame_vehicle, truth;
   Matrix6d cov = Matrix6d::Zero();
@@ -34,7 +34,7 @@ std::vector<Told> drive(const char* name, double duration_s, uint64_t seed, bool
   return told;
 }
 
-/// Metres in a unit by what a part of a drive says of its first metres.
+/// Metres per unit from the first metres of a part of a drive.
 double metres_in_unit(const std::vector<Told>& told, int part, double first_m) {
   double way = 0.0, way_m = 0.0;
   const Told* before = nullptr;
@@ -49,8 +49,8 @@ double metres_in_unit(const std::vector<Told>& told, int part, double first_m) {
   return way_m / way;
 }
 
-/// Mean squared error of the place seen from above over its variance, along the first part of a drive; with `cov` those
-/// that another drive over the same pictures has claimed, in metres.
+/// Mean squared horizontal position error over its variance, along the first part of a drive; with `cov` the
+/// covariances of another drive over the same images, in metres.
 double nees(const std::vector<Told>& told, const std::vector<Told>* cov) {
   const double unit = metres_in_unit(told, told.front().part, 8.0);
   const SE3 first{told.front().T_frame_vehicle.q, unit * told.front().T_frame_vehicle.p};
@@ -70,7 +70,7 @@ double nees(const std::vector<Told>& told, const std::vector<Told>* cov) {
   return sum / count;
 }
 
-TEST_CASE("one eye without speeds says how much of its scale is lost, and its lever's unit", "[statistics]") {
+TEST_CASE("monocular scale drift and lever arm are consistent without speeds", "[statistics]") {
   constexpr int kSeeds = 2;
   double own = 0.0, as_with_speeds = 0.0;
   for (const char* name : {"turn", "demo"}) {
@@ -86,7 +86,7 @@ TEST_CASE("one eye without speeds says how much of its scale is lost, and its le
   CHECK(as_with_speeds > 3.0);  // teeth
 }
 
-TEST_CASE("one eye that is lost at a light begins again in a unit like the one before") {
+TEST_CASE("a monocular restart at a traffic light keeps the unit of length") {
   const std::vector<Told> told = drive("city_loop", 50.0, 1, false);
   const int first = told.front().part, last = told.back().part;
   REQUIRE(last > first);
@@ -96,7 +96,7 @@ TEST_CASE("one eye that is lost at a light begins again in a unit like the one b
   std::printf("unit %.2f m before the light and %.2f m after; lost at %.3f units/s\n", before, after, stood);
   CHECK(after < 5.0 * before);
   CHECK(after > 0.2 * before);
-  CHECK(stood < 0.1);  // teeth: as fast as it was lost, it would have gone a tenth of that in a second
+  CHECK(stood < 0.1);  // teeth: at the speed of the loss it would move a tenth of that per second
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// The tracker's map and the horizon that an INS knows.
+/// Levelling of the tracker's map by an INS.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <roadfix/pose_t.hpp>
@@ -11,19 +11,19 @@ namespace {
 
 using namespace test;
 
-constexpr double kSlope = 0.05;  // rad, the nose up: pitch is negative
+constexpr double kSlope = 0.05;  // rad, nose up: pitch is negative
 constexpr int kStanding = 15;    // frames before the drive
 
-/// The first picture for a second and a half, then the drive's first forty frames.
+/// The first image for a second and a half, then the drive's first forty frames.
 std::vector<Sent> standing_first() {
   std::vector<Sent> all;
   for (int i = 0; i < kStanding + 40; ++i) {
     for (const size_t eye : {0U, 1U}) {
-      Sent m = pictures()[2 * static_cast<size_t>(std::max(0, i - kStanding)) + eye];
-      auto picture = decode<image_t>(m.bytes);
-      picture.seq = i;
-      picture.utime = m.arrival_us = kFrame_us * (i + 1);
-      m.bytes = encode(picture);
+      Sent m = images()[2 * static_cast<size_t>(std::max(0, i - kStanding)) + eye];
+      auto image = decode<image_t>(m.bytes);
+      image.seq = i;
+      image.utime = m.arrival_us = kFrame_us * (i + 1);
+      m.bytes = encode(image);
       all.push_back(m);
     }
   }
@@ -44,7 +44,7 @@ std::vector<Sent> with_slope(std::vector<Sent> all, double sigma_deg) {
     m.q_wxyz[3] = q.z();
     m.validity = pose_t::VALIDITY_VALID;
     for (int k = 3; k < 6; ++k) m.cov_pose_m2_rad2[k][k] = k == 5 ? 1.0 : sigma * sigma;
-    m.cov_velocity_m2ps2[0][0] = 1e6;  // of no use as a speed
+    m.cov_velocity_m2ps2[0][0] = 1e6;  // not usable as a speed
     all.push_back(sent("POSE_INS", 20'000 * (i + 1), i, m));
   }
   std::stable_sort(all.begin(), all.end(), [](const Sent& a, const Sent& b) { return a.arrival_us < b.arrival_us; });
@@ -56,10 +56,10 @@ double pitch(const pose_t& m) {
   return std::asin(-(q * Eigen::Vector3d::UnitX()).z());
 }
 
-TEST_CASE("an INS that knows the horizon levels the map once, and the reset counter says so") {
+TEST_CASE("an INS attitude levels the map once, and the reset counter increases") {
   const auto poses = run(with_slope(standing_first(), 0.1), true).all<pose_t>("POSE_VO");
   REQUIRE(poses.size() == kStanding + 40);
-  CHECK(std::abs(pitch(poses[3])) < 0.002);  // nobody has been heard
+  CHECK(std::abs(pitch(poses[3])) < 0.002);  // not levelled yet
   CHECK(poses[3].reset_counter == 0);
   for (size_t i = 7; i < poses.size(); ++i) CHECK(poses[i].reset_counter == 1);
   CHECK(poses[7].reset_delta_m[0] == 0.0);
@@ -68,13 +68,13 @@ TEST_CASE("an INS that knows the horizon levels the map once, and the reset coun
   const double way = poses.back().position_m[0] - poses[7].position_m[0];
   CHECK(way == Approx(39 * kStep).epsilon(0.03));
   CHECK(poses.back().position_m[2] - poses[7].position_m[2] == Approx(std::tan(kSlope) * way).epsilon(0.1));
-  CHECK(poses[3].cov_pose_m2_rad2[4][4] < 1e-7);  // of a map whose axes are its own
+  CHECK(poses[3].cov_pose_m2_rad2[4][4] < 1e-7);  // relative to the map's own axes
   const double sigma = 0.1 * M_PI / 180.0;
   CHECK(poses[8].cov_pose_m2_rad2[4][4] == Approx(sigma * sigma).epsilon(0.1));
   CHECK(poses.back().cov_pose_m2_rad2[2][2] > 0.8 * std::pow(sigma * way, 2));
 }
 
-TEST_CASE("mono that has stood on a slope begins level, without a jump") {
+TEST_CASE("a monocular standstill on a slope starts level, without a jump") {
   const auto poses = run(with_slope(standing_first(), 0.1), false).all<pose_t>("POSE_VO");
   const auto begun =
       std::find_if(poses.begin(), poses.end(), [](const pose_t& p) { return p.validity == pose_t::VALIDITY_VALID; });
@@ -83,7 +83,7 @@ TEST_CASE("mono that has stood on a slope begins level, without a jump") {
   CHECK(poses.back().reset_counter == 0);
 }
 
-TEST_CASE("a vague horizon, none, or a configuration against it leaves the map as it is") {
+TEST_CASE("an uncertain, missing or disabled levelling leaves the map unchanged") {
   const auto unchanged = [](double sigma_deg, double level_std_deg) {
     VoTrackerConfig config = threads(1);
     config.keyframe.level_std_deg = level_std_deg;
@@ -95,7 +95,7 @@ TEST_CASE("a vague horizon, none, or a configuration against it leaves the map a
   CHECK_FALSE(unchanged(0.1, 0.3));  // teeth
 }
 
-TEST_CASE("a state saved before the map is level goes on with the same bytes") {
+TEST_CASE("a state saved before levelling continues with the same bytes") {
   const auto all = with_slope(standing_first(), 0.1);
   Collector whole, rest;
   StageRunner runner(make_vo_tracker(calibration(true), threads(1)), whole);

@@ -1,4 +1,4 @@
-#include "vo_tracker/picture.h"
+#include "vo_tracker/image.h"
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -34,12 +34,12 @@ cv::Mat decoded(const image_t& message) {
 
 }  // namespace
 
-cv::Mat grey_picture(const image_t& message) {
+cv::Mat grey_image(const image_t& message) {
   try {
-    cv::Mat picture = decoded(message);
-    const bool fits = picture.cols == message.width_px && picture.rows == message.height_px;
-    return fits && picture.type() == CV_8UC1 ? picture : cv::Mat();
-  } catch (const cv::Exception&) {  // what a damaged picture draws from OpenCV
+    cv::Mat image = decoded(message);
+    const bool fits = image.cols == message.width_px && image.rows == message.height_px;
+    return fits && image.type() == CV_8UC1 ? image : cv::Mat();
+  } catch (const cv::Exception&) {  // OpenCV's reaction to damaged images
     return {};
   }
 }

@@ -1,4 +1,4 @@
-/// Where the front end is told to look for each track in the next picture.
+/// Predicted position of each track in the next image.
 #include <algorithm>
 #include <limits>
 
@@ -8,7 +8,7 @@
 namespace roadfix {
 namespace {
 
-/// A track without a point is expected as near as the point beside it; where there is none, far away.
+/// A track without a point is predicted with the depth of the nearest track with one, else at infinity.
 double inverse_depth_near(const Eigen::Vector2f& pixel, const auto& known) {
   double inverse_depth = 0.0;
   float nearest = std::numeric_limits<float>::infinity();
@@ -23,12 +23,12 @@ double inverse_depth_near(const Eigen::Vector2f& pixel, const auto& known) {
 
 }  // namespace
 
-std::optional<Eigen::Vector2d> KeyframeTracker::appears(const Eigen::Vector3d& p_camera) const {
+std::optional<Eigen::Vector2d> KeyframeTracker::project_pixel(const Eigen::Vector3d& p_camera) const {
   if (!(p_camera.z() > kMinReprojectionDepth)) return std::nullopt;
-  return left_.distort(map_.lens().bend(p_camera.hnormalized()));
+  return left_.distort(map_.lens().apply(p_camera.hnormalized()));
 }
 
-/// Where the last picture showed points, and how near they were.
+/// Pixels and inverse depths of the points in the last image.
 std::vector<KeyframeTracker::KnownDepth> KeyframeTracker::known_depths() const {
   std::vector<KnownDepth> known;
   const SE3 T_camera_map = T_map_camera_.inverse();
@@ -41,7 +41,7 @@ std::vector<KeyframeTracker::KnownDepth> KeyframeTracker::known_depths() const {
   return known;
 }
 
-std::vector<Feature> KeyframeTracker::hints(const SE3& T_map_camera) const {
+std::vector<Feature> KeyframeTracker::predicted_features(const SE3& T_map_camera) const {
   std::vector<Feature> out;
   const SE3 T_camera_map = T_map_camera.inverse();
   const SE3 T_now_before = T_camera_map * T_map_camera_;
@@ -50,18 +50,18 @@ std::vector<Feature> KeyframeTracker::hints(const SE3& T_map_camera) const {
     const Landmark* landmark = map_.find(track);
     std::optional<Eigen::Vector2d> expected;
     if (landmark != nullptr && landmark->p_map) {
-      expected = appears(T_camera_map * *landmark->p_map);
+      expected = project_pixel(T_camera_map * *landmark->p_map);
     } else if (const auto before = left_.unproject(pixel.cast<double>())) {
-      const Eigen::Vector3d direction = map_.lens().straighten(*before).homogeneous();
-      expected = appears(T_now_before.q * direction + inverse_depth_near(pixel, known) * T_now_before.p);
+      const Eigen::Vector3d direction = map_.lens().remove(*before).homogeneous();
+      expected = project_pixel(T_now_before.q * direction + inverse_depth_near(pixel, known) * T_now_before.p);
     }
     if (expected) out.push_back({track, expected->cast<float>()});
   }
-  // Landmarks that were not found in the last pictures: a descriptor front end may still know them.
+  // Landmarks not detected in the last images: a descriptor front end may redetect them.
   const size_t seen = out.size();
   for (const auto& [track, landmark] : map_.landmarks()) {
-    if (!landmark.p_map || pixels_.contains(track) || landmark.sightings.back().keyframe != map_.last().id) continue;
-    const auto expected = appears(T_camera_map * *landmark.p_map);
+    if (!landmark.p_map || pixels_.contains(track) || landmark.observations.back().keyframe != map_.last().id) continue;
+    const auto expected = project_pixel(T_camera_map * *landmark.p_map);
     if (expected && left_.sees(*expected)) out.push_back({track, expected->cast<float>()});
   }
   std::inplace_merge(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(seen), out.end(),

@@ -1,5 +1,5 @@
-/// A map's turn to the horizon.
-#include "slam/level.h"
+/// Levelling of a map.
+#include "slam/levelling.h"
 
 #include <catch2/catch.hpp>
 
@@ -8,20 +8,20 @@
 namespace roadfix {
 namespace {
 
-TEST_CASE("a turn to level makes the map's z the horizon's up, and turns no further") {
+TEST_CASE("the levelling rotation is the smallest one that aligns z with up") {
   const Eigen::Quaterniond q_map_vehicle = exp_q({0.02, -0.05, 1.1}), q_level_vehicle = exp_q({-0.03, 0.04, -2.0});
-  const Eigen::Quaterniond q = turn_to_level(q_map_vehicle, q_level_vehicle);
+  const Eigen::Quaterniond q = levelling_rotation(q_map_vehicle, q_level_vehicle);
   const Eigen::Vector3d up = q * q_map_vehicle * (q_level_vehicle.conjugate() * Eigen::Vector3d::UnitZ());
   CHECK((up - Eigen::Vector3d::UnitZ()).norm() < 1e-12);
   CHECK(std::abs(log_q(q).z()) < 1e-12);  // about a horizontal axis
   CHECK(log_q(q).norm() > 0.01);
-  CHECK(log_q(turn_to_level(q_map_vehicle, q_map_vehicle)).norm() < 1e-12);
+  CHECK(log_q(levelling_rotation(q_map_vehicle, q_map_vehicle)).norm() < 1e-12);
 }
 
-TEST_CASE("a levelled covariance is that of a pose whose horizon is off") {
+TEST_CASE("the levelled covariance is that of a pose with a levelling error") {
   const SE3 T{exp_q({0.3, -1.2, 0.8}), {4.0, -2.0, 1.0}};
-  const LevelTurn turn{exp_q({0.02, 0.03, 0.0}), {1.0, 5.0, -0.5}, 0.002};
-  const auto off = [&](const Eigen::Vector3d& tilt) {  // the same map with another horizon
+  const LevellingRotation turn{exp_q({0.02, 0.03, 0.0}), {1.0, 5.0, -0.5}, 0.002};
+  const auto off = [&](const Eigen::Vector3d& tilt) {  // the same map with another level
     const Eigen::Quaterniond q = exp_q(tilt);
     return local(T, SE3{q, turn.pivot - q * turn.pivot} * T);
   };
@@ -33,7 +33,7 @@ TEST_CASE("a levelled covariance is that of a pose whose horizon is off") {
   }
   const Matrix6d expected = turn.sigma * turn.sigma * J * J.transpose();
   CHECK(turn.covariance(Matrix6d::Zero(), T).isApprox(expected, 1e-6));
-  const LevelTurn elsewhere{turn.q, turn.pivot + Eigen::Vector3d(0.1, 0.0, 0.0), turn.sigma};
+  const LevellingRotation elsewhere{turn.q, turn.pivot + Eigen::Vector3d(0.1, 0.0, 0.0), turn.sigma};
   CHECK_FALSE(elsewhere.covariance(Matrix6d::Zero(), T).isApprox(expected, 1e-6));  // teeth
   Matrix6d before = Matrix6d::Zero();
   before(0, 0) = 1.0;

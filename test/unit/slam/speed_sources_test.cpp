@@ -1,47 +1,46 @@
-/// Wheels tell the newest way at once and wrongly, an INS rightly and half a second late. Which length does one eye
-/// take?
+/// Two sources of scale: wheels with a scale error at once, an INS with the right scale half a second late.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
 
 #include "fed_tracker.h"
-#include "slam/travel.h"
+#include "slam/distance_history.h"
 
 namespace roadfix {
 namespace {
 
 constexpr int64_t kLate_us = 500'000;
-constexpr double kShort = 0.985;  ///< what the wheels tell of a way
+constexpr double kShort = 0.985;  ///< scale of the wheel speeds
 
-/// Wheels and an INS at `speed` until the twentieth second, the INS known to `ins_scale` of it.
-std::optional<Travel> newest_way(double speed, double ins_scale) {
+/// Wheels and an INS at `speed` until the twentieth second; the INS has the relative sigma `ins_scale`.
+std::optional<TravelledDistance> newest_way(double speed, double ins_scale) {
   constexpr int64_t kEnd_us = 20'000'000;
-  TravelHistory wheels, ins;
+  DistanceHistory wheels, ins;
   for (int64_t t_us = 0; t_us <= kEnd_us; t_us += 50'000) {
     wheels.add({t_us, SpeedSource::kWheels, kShort * speed, 0.03, 0.01});
     if (t_us <= kEnd_us - kLate_us) ins.add({t_us, SpeedSource::kIns, speed, ins_scale * speed, ins_scale});
   }
-  return in_scale_of(ins, wheels, kEnd_us - 100'000, kEnd_us);
+  return rescaled_distance(ins, wheels, kEnd_us - 100'000, kEnd_us);
 }
 
-TEST_CASE("the newest way is the wheels' in the scale of an INS that comes later") {
+TEST_CASE("recent wheel distances are rescaled to a later INS") {
   const auto way = newest_way(14.0, 0.002);
   REQUIRE(way);
   CHECK(way->distance == Approx(1.4).epsilon(1e-6));
   CHECK(way->scale_std > 0.002);
   CHECK(way->scale_std < 0.0025);
-  CHECK(way->sigma < 0.01);  // as well as the wheels tell it; the INS alone would be off by its lateness
+  CHECK(way->sigma < 0.01);  // with the wheels' noise; extrapolating the INS would be less accurate
 }
 
-TEST_CASE("wheels keep their own scale where the INS knows no better, and at a standstill") {
+TEST_CASE("wheels keep their own scale when the INS is less certain, and at a standstill") {
   CHECK_FALSE(newest_way(14.0, 0.02));
   CHECK_FALSE(newest_way(1e-4, 0.002));
-  CHECK_FALSE(in_scale_of({}, {}, 0, 1));
+  CHECK_FALSE(rescaled_distance({}, {}, 0, 1));
 }
 
-/// What one eye makes of a drive with such speeds.
+/// The monocular result of a drive with such speeds.
 struct Learnt {
-  double length = 0.0;  ///< logarithm of the way over the true one
+  double length = 0.0;  ///< logarithm of the estimated over the true distance
   double radial = 0.0;
 };
 
@@ -78,7 +77,7 @@ Learnt drive(uint64_t seed, bool with_ins) {
   return {std::log(way / true_way), tracker->lens().value(LensCorrection::kRadial)};
 }
 
-TEST_CASE("two speeds that differ bend neither the length nor the lens", "[statistics]") {
+TEST_CASE("two sources with different scales distort neither scale nor lens", "[statistics]") {
   constexpr int kSeeds = 3;
   double length = 0.0, radial = 0.0, wheels = 0.0;
   for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -91,7 +90,7 @@ TEST_CASE("two speeds that differ bend neither the length nor the lens", "[stati
               radial, 100.0 * wheels);
   CHECK(std::abs(length) < 0.001);
   CHECK(std::abs(radial) < 0.0015);
-  CHECK(wheels < -0.01);  // teeth: the wheels are that wrong, and one eye believes what it is told
+  CHECK(wheels < -0.01);  // teeth: the scale error of the wheels alone
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "slam/shared_error.h"
+#include "slam/considered_scales.h"
 
 #include <catch2/catch.hpp>
 #include <random>
@@ -9,9 +9,9 @@ namespace roadfix {
 namespace {
 
 constexpr int kSteps = 60;
-constexpr double kLost = 1e-4;  // variance a step
+constexpr double kLost = 1e-4;  // variance per step
 
-/// A metre a step, straight on and around a bend.
+/// One metre per step, straight and around a bend.
 SE3 after(int steps) {
   SE3 T;
   for (int i = 0; i < steps; ++i) {
@@ -20,13 +20,13 @@ SE3 after(int steps) {
   return T;
 }
 
-TEST_CASE("a scale that is lost on the way is what the place is off by") {
+TEST_CASE("the scale drift covariance is consistent with the position error") {
   constexpr int kDraws = 400;
   const auto claimed = [](double lost) {
-    SharedError error;
+    ConsideredScales error;
     for (int i = 0; i <= kSteps; ++i) {
-      error.go_to(after(i), {});
-      error.lose_scale(lost);
+      error.propagate_to(after(i), {});
+      error.add_scale_drift(lost);
     }
     return Eigen::Matrix2d(error.cov().topLeftCorner<3, 3>()({0, 2}, {0, 2}));
   };
@@ -50,32 +50,32 @@ TEST_CASE("a scale that is lost on the way is what the place is off by") {
   CHECK(nees_quarter > 3.0);  // teeth
 }
 
-TEST_CASE("a map moved has the same error in its new axes, and one that begins elsewhere none") {
+TEST_CASE("a transformed map has the same error in its new axes; one with a new start has none") {
   const Eigen::Vector3d lever(0.0, 1.5, -1.6);
-  SharedError error, moved;
+  ConsideredScales error, moved;
   const SE3 turn{exp_q({0.1, 0.7, -0.2}), {3.0, 0.0, 1.0}};
   for (int i = 0; i <= kSteps; ++i) {
-    error.go_to(after(i), {0.01, 0.003}, lever);
-    error.lose_scale(kLost);
-    moved.go_to(i <= 30 ? after(i) : turn * after(i), {0.01, 0.003}, lever);
-    moved.lose_scale(kLost);
+    error.propagate_to(after(i), {0.01, 0.003}, lever);
+    error.add_scale_drift(kLost);
+    moved.propagate_to(i <= 30 ? after(i) : turn * after(i), {0.01, 0.003}, lever);
+    moved.add_scale_drift(kLost);
     if (i == 30) moved.move(turn);
   }
   Matrix6d R = Matrix6d::Identity();
   R.topLeftCorner<3, 3>() = turn.R();
   CHECK(moved.cov().isApprox(R * error.cov() * R.transpose(), 1e-9));
   CHECK_FALSE(moved.cov().isApprox(error.cov(), 1e-2));  // teeth
-  moved.begin_at(SE3{});
+  moved.start_at(SE3{});
   CHECK(moved.cov().isZero(0.0));
 }
 
-TEST_CASE("a lever in a unit that nobody knows moves the vehicle where it turns") {
+TEST_CASE("a lever arm in an unknown unit moves the vehicle when it rotates") {
   const Eigen::Vector3d lever(0.0, 1.5, -1.6);
-  SharedError straight, bend, known;
+  ConsideredScales straight, bend, known;
   for (int i = 0; i <= kSteps; ++i) {
-    straight.go_to({Eigen::Quaterniond::Identity(), i * Eigen::Vector3d::UnitZ()}, {}, lever);
-    bend.go_to(after(i), {}, lever);
-    known.go_to(after(i), {});
+    straight.propagate_to({Eigen::Quaterniond::Identity(), i * Eigen::Vector3d::UnitZ()}, {}, lever);
+    bend.propagate_to(after(i), {}, lever);
+    known.propagate_to(after(i), {});
   }
   const Eigen::Vector3d moved = after(kSteps).q * lever - lever;
   CHECK(bend.cov().topLeftCorner<3, 3>().isApprox(moved * moved.transpose(), 1e-9));

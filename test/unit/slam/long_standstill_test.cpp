@@ -1,4 +1,5 @@
-/// One eye at a light, by tracks without pixels: standing tells no depth, and neither may it cost what was known.
+/// A monocular camera at a traffic light, by simulated tracks: a standstill adds no depth information and must not
+/// degrade the estimate.
 #include <catch2/catch.hpp>
 #include <cstdio>
 #include <random>
@@ -13,17 +14,17 @@ using test::exact_lens;
 using test::FedTracker;
 using test::shortened;
 
-/// city_loop's begin up to its light with one eye and wheels, and half a minute there: what drives by covers tracks,
-/// others come in their place.
+/// The start of city_loop up to its traffic light, monocular with wheels, and half a minute there: passing vehicles end
+/// tracks, new ones replace them.
 struct LongStand {
-  int pictures = 0, valid = 0;
-  double moved = 0.0;              ///< m, at most, from where the car came to stand
-  double turn = 0.0, place = 0.0;  ///< rad, m: by how much its claim has grown
+  int images = 0, valid = 0;
+  double moved = 0.0;              ///< m, maximum, from the standstill position
+  double turn = 0.0, place = 0.0;  ///< rad, m: growth of the standard deviations
 };
 
 LongStand long_stand(double standing_flow_px) {
   constexpr int kPictures = 300;
-  constexpr double kLoss = 0.03, kNoise = 0.2;  // a picture; px
+  constexpr double kLoss = 0.03, kNoise = 0.2;  // per image; px
   TrackConfig config_tracks;
   config_tracks.noise_px = kNoise;
   const test::TrackDrive d = test::make_track_drive(shortened("city_loop", 45.0), 7, config_tracks);
@@ -39,7 +40,7 @@ LongStand long_stand(double standing_flow_px) {
     tracker->speed({frame->t_us, SpeedSource::kWheels, speed, 0.05, 0.01});
     (void)tracker.process(frame->t_us, frame->tracks);
     light = frame;
-    if (++count > 200 && speed < 0.01) break;  // it stands at the begin, too
+    if (++count > 200 && speed < 0.01) break;  // it also stands at the start
   }
   const Odometry stopped = tracker->last().odometry;
   std::mt19937 random(7);
@@ -55,7 +56,7 @@ LongStand long_stand(double standing_flow_px) {
     for (TrackObservation& o : seen) o.left += Eigen::Vector2d(noise(random), noise(random));
     tracker->speed({t_us, SpeedSource::kWheels, 0.0, 0.05, 0.01});
     const Odometry& o = tracker.process(t_us, seen).odometry;
-    ++stand.pictures;
+    ++stand.images;
     if (o.validity != Validity::kValid) continue;
     ++stand.valid;
     stand.moved = std::max(stand.moved, (o.T_frame_vehicle.p - stopped.T_frame_vehicle.p).norm());
@@ -66,15 +67,15 @@ LongStand long_stand(double standing_flow_px) {
   return stand;
 }
 
-TEST_CASE("mono that stands for long stays where it is, and is as sure of it, whatever covers its tracks") {
+TEST_CASE("a long monocular standstill keeps pose and covariance while tracks are replaced") {
   const LongStand held = long_stand(KeyframeTrackerConfig{}.standing_flow_px), lost = long_stand(0.0);
   std::printf("long stand: %d of %d valid, moved %.3f m, claims %.3f deg and %.3f m more; %d where it is not known\n",
-              held.valid, held.pictures, held.moved, held.turn / kDegree, held.place, lost.valid);
-  CHECK(held.valid == held.pictures);
+              held.valid, held.images, held.moved, held.turn / kDegree, held.place, lost.valid);
+  CHECK(held.valid == held.images);
   CHECK(held.moved < 0.05);
   CHECK(held.turn < 0.3 * kDegree);
   CHECK(held.place < 0.2);
-  CHECK(lost.valid < lost.pictures / 2);  // teeth
+  CHECK(lost.valid < lost.images / 2);  // teeth
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-/// Where the tracker tells its front end to look.
+/// Predicted track positions for the front end.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdio>
@@ -8,7 +8,7 @@
 namespace roadfix {
 namespace {
 
-/// By how much hints were off, px, of tracks begun in the picture before: they have no points.
+/// Prediction errors, px, of tracks started in the previous image, which have no points.
 struct Hinted {
   std::vector<double> off, off_where_it_was;
 };
@@ -52,7 +52,7 @@ double share_below(const std::vector<double>& numbers, double limit) {
   return static_cast<double>(below) / static_cast<double>(numbers.size());
 }
 
-TEST_CASE("a track that has no point yet is looked for as near as the points beside it") {
+TEST_CASE("a track without a point is predicted with the depth of its neighbours") {
   constexpr double kReach = 8.0;  // px, at 330 to 720 px of focal length
   ScenarioConfig scenario = test::shortened("highway", 12.0);
   scenario.camera.layout = CameraLayout::kMono;
@@ -65,14 +65,14 @@ TEST_CASE("a track that has no point yet is looked for as near as the points bes
   InlineExecutor executor;
   fix_eigen_blocking();
   KeyframeTracker tracker(test::exact_lens(), rig, std::make_unique<HintedFrontEnd>(seen, hinted), executor);
-  cv::Mat picture(scenario.camera.height_px, scenario.camera.width_px, CV_8UC1);
-  for (int i = 0; i < static_cast<int>(picture.total()); ++i) picture.data[i] = static_cast<uint8_t>(i % 2 * 64);
+  cv::Mat image(scenario.camera.height_px, scenario.camera.width_px, CV_8UC1);
+  for (int i = 0; i < static_cast<int>(image.total()); ++i) image.data[i] = static_cast<uint8_t>(i % 2 * 64);
   for (const auto& event : d.events) {
     const auto* frame = std::get_if<test::TrackFrame>(&event);
     if (frame == nullptr) continue;
     seen->now.clear();
     for (const TrackObservation& o : frame->tracks) seen->now.emplace(o.id, o);
-    (void)tracker.process({frame->t_us, picture, {}});
+    (void)tracker.process({frame->t_us, image, {}});
   }
   REQUIRE(hinted->off.size() > 500);
   const double near = share_below(hinted->off, kReach), where_it_was = share_below(hinted->off_where_it_was, kReach);

@@ -1,0 +1,58 @@
+/// Scale errors common to all lengths and all rotations of a trajectory, from calibration or speeds: not observable in
+/// images, considered but not estimated (Schmidt). MODEL.md (S.10.1). And the scale drift of a monocular map without
+/// speeds, (S.10.2).
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "geometry/se3.h"
+
+namespace roadfix {
+
+/// Relative sigmas.
+struct ScaleSigmas {
+  double length = 0.0;
+  double rotation = 0.0;
+};
+
+/// Error of a pose per sigma, one column for lengths and one for rotations. Order: position in the map, rotation in the
+/// pose's axes.
+using ScaleSensitivity = Eigen::Matrix<double, 6, 2>;
+
+/// Propagates these errors along the trajectory. A jump counts as motion: the common scale applies to it as well.
+class ConsideredScales {
+ public:
+  /// Restarts at a pose given from outside, which has none of the error accumulated so far.
+  void start_at(const SE3& T_map_camera);
+  /// From the last pose to this one; the first call starts. `lever`: of the vehicle in camera axes, m, where the unit
+  /// of the map is not metric.
+  void propagate_to(const SE3& T_map_camera, const ScaleSigmas& sigmas,
+                    const Eigen::Vector3d& lever = Eigen::Vector3d::Zero());
+  /// Adds to the variance of the logarithm of the scale.
+  void add_scale_drift(double variance) { cov_scale_ += variance; }
+  /// The scale is measured from here on.
+  void reset_scale_drift();
+  /// Applies a transform of the map's axes.
+  void move(const SE3& T_new_old);
+
+  [[nodiscard]] const ScaleSensitivity& columns() const { return columns_; }
+  /// Of the camera; of the vehicle after transport to it.
+  [[nodiscard]] Matrix6d cov() const;
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.begun_, self.T_map_camera_, self.columns_, self.cov_drift_, self.cov_drift_scale_, self.cov_scale_,
+            self.lever_);
+  }
+
+ private:
+  bool begun_ = false;
+  SE3 T_map_camera_;
+  ScaleSensitivity columns_ = ScaleSensitivity::Zero();
+  Matrix6d cov_drift_ = Matrix6d::Zero();            ///< of the pose, due to scale drift
+  Vector6d cov_drift_scale_ = Vector6d::Zero();      ///< cross covariance with the scale
+  double cov_scale_ = 0.0;                           ///< of the logarithm of the scale
+  Eigen::Vector3d lever_ = Eigen::Vector3d::Zero();  ///< error of the vehicle's position per sigma of the unit
+};
+
+}  // namespace roadfix
