@@ -27,20 +27,20 @@ double robust_curvature(double r2, double huber) { return r2 <= huber * huber ? 
 /// one.
 enum class Purpose { kStep, kCovariance };
 
-class Eyes {
+class PosedCameras {
  public:
-  explicit Eyes(const BundleProblem& problem) {
+  explicit PosedCameras(const BundleProblem& problem) {
     for (const BundleProblem::View& view : problem.views) {
-      eyes_.emplace_back(view.T_map_camera, problem.lens);
-      eyes_.emplace_back(view.T_map_camera, problem.lens, problem.T_right_left);
+      cameras_.emplace_back(view.T_map_camera, problem.lens);
+      cameras_.emplace_back(view.T_map_camera, problem.lens, problem.T_right_left);
     }
   }
   [[nodiscard]] const PosedCamera& of(const BundleProblem::Observation& o) const {
-    return eyes_[static_cast<size_t>(2 * o.view + (o.right ? 1 : 0))];
+    return cameras_[static_cast<size_t>(2 * o.view + (o.right ? 1 : 0))];
   }
 
  private:
-  std::vector<PosedCamera> eyes_;
+  std::vector<PosedCamera> cameras_;
 };
 
 Eigen::Vector3d separation(const BundleProblem& problem, const BundleProblem::Distance& d) {
@@ -49,18 +49,19 @@ Eigen::Vector3d separation(const BundleProblem& problem, const BundleProblem::Di
 }
 
 /// One observation at the current estimate, normalised by sigma.
-struct Sight {
+struct ReprojectedObservation {
   ReprojectionJacobian J;
   Eigen::Vector2d residual;
   double r2 = 0.0;
   bool visible = false;
 };
 
-Sight sight(const BundleProblem& problem, const Eyes& eyes, const BundleProblem::Observation& o) {
+ReprojectedObservation reproject(const BundleProblem& problem, const PosedCameras& cameras,
+                                 const BundleProblem::Observation& o) {
   const double scale = problem.focal_px / problem.sigma_px;
-  Sight s;
+  ReprojectedObservation s;
   Eigen::Vector2d seen;
-  s.visible = eyes.of(o).project(problem.points[static_cast<size_t>(o.point)], seen, &s.J);
+  s.visible = cameras.of(o).project(problem.points[static_cast<size_t>(o.point)], seen, &s.J);
   const BundleProblem::View& view = problem.views[static_cast<size_t>(o.view)];
   if (view.fixed && s.visible) s.J.correction += s.J.pose * view.lens_sensitivity;
   s.residual = scale * (o.normalised - seen);
@@ -78,10 +79,10 @@ struct TrackCost {
   double score_curvature = 0.0;  ///< subtracted from the second derivative times the squared score, (S.7.13)
 };
 
-TrackCost track_cost(const std::vector<Sight>& sights, const BundleProblem& problem) {
+TrackCost track_cost(const std::vector<ReprojectedObservation>& reprojected, const BundleProblem& problem) {
   TrackCost t;
   double sum = 0.0, numbers = 0.0;
-  for (const Sight& s : sights) {
+  for (const ReprojectedObservation& s : reprojected) {
     if (!s.visible) {
       t.cost += kInvisibleCost;
       continue;
@@ -107,19 +108,20 @@ struct Linearised {
 Linearised linearise(const BundleProblem& problem, const std::vector<int>& free, int num_free,
                      Purpose purpose = Purpose::kStep, std::vector<double>* error_px = nullptr) {
   Linearised result{NormalEquations(num_free, problem.points.size(), problem.observations.size())};
-  const Eyes eyes(problem);
+  const PosedCameras cameras(problem);
   const LensCorrection::Vector lens = problem.lens_prior.value - problem.lens.value;
   result.cost = 0.5 * lens.dot(problem.lens_information * lens);
   result.equations.add_lens_prior(problem.lens_information, lens);
-  std::vector<Sight> sights;
+  std::vector<ReprojectedObservation> reprojected;
   for (auto o = problem.observations.begin(); o != problem.observations.end();) {
     const auto track = o;
-    sights.clear();
-    while (o != problem.observations.end() && o->point == track->point) sights.push_back(sight(problem, eyes, *o++));
-    const TrackCost t = track_cost(sights, problem);
+    reprojected.clear();
+    while (o != problem.observations.end() && o->point == track->point)
+      reprojected.push_back(reproject(problem, cameras, *o++));
+    const TrackCost t = track_cost(reprojected, problem);
     result.cost += t.cost;
     auto seen = track;
-    for (const Sight& s : sights) {
+    for (const ReprojectedObservation& s : reprojected) {
       const int view = free[static_cast<size_t>((seen++)->view)];
       if (error_px != nullptr) {
         error_px->push_back(s.visible ? problem.sigma_px * std::sqrt(s.r2) : std::numeric_limits<double>::infinity());

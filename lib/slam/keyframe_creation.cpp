@@ -167,9 +167,9 @@ bool KeyframeTracker::track_bearing_only(const CameraFrame& frame, const std::ve
   return true;
 }
 
-/// What the right eye sees, for those who take the tracks.
+/// Records the right pixels for VO_FEATURES.
 void KeyframeTracker::record_right_pixels(const std::vector<Feature>& features,
-                                 const std::vector<std::optional<Eigen::Vector2f>>& right) {
+                                          const std::vector<std::optional<Eigen::Vector2f>>& right) {
   auto used = out_.features.begin();
   for (size_t i = 0; i < features.size(); ++i) {  // both in ascending order of track
     while (used != out_.features.end() && used->feature.track < features[i].track) ++used;

@@ -90,8 +90,8 @@ const Landmark* LocalMap::find(int64_t track) const {
 double LocalMap::worst_error_px(const Landmark& landmark, const Eigen::Vector3d& p_map) const {
   double worst = 0.0;
   Eigen::Vector2d seen;
-  const auto check = [&](const PosedCamera& eye, const Eigen::Vector2d& where) {
-    const bool visible = eye.project(p_map, seen);
+  const auto check = [&](const PosedCamera& camera, const Eigen::Vector2d& where) {
+    const bool visible = camera.project(p_map, seen);
     worst = std::max(worst, visible ? focal_px_ * (seen - where).norm() : 1e9);
   };
   for (const LandmarkObservation& s : landmark.observations) {
