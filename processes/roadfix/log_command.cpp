@@ -10,6 +10,7 @@
 #include "bus/log/log_survey.h"
 #include "bus/log/log_writer.h"
 #include "bus/types/message.h"
+#include "bus/types/type_conversion.h"
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "roadfix/console.h"
@@ -46,6 +47,13 @@ void print_info(const LogArguments& arguments) {
                              static_cast<double>(channel.last_utime - channel.first_utime) * 1e-6, channel.runs.size());
   }
   if (survey.ours() == 0) std::cout << "no message of a type of Roadfix's: another LCM user's log\n";
+  for (const TypeRule& rule : released_rules()) {
+    const bool old = std::any_of(survey.channels.begin(), survey.channels.end(),
+                                 [&](const auto& c) { return c.second.type == rule.from; });
+    if (old)
+      std::cout << fmt::format("{} is a type of {}: roadfix log convert makes it {}\n", rule.from, rule.version,
+                               rule.to);
+  }
   print_damage(arguments, survey.damage);
 }
 
@@ -131,11 +139,37 @@ void filter_log(const LogArguments& arguments) {
   });
 }
 
+/// Messages of released types that have been replaced become messages of today's; everything else stays as it is.
+void convert_log(const LogArguments& arguments) {
+  arguments.out.refuse_existing(arguments.in);
+  const TypeConverter& converter = TypeConverter::built_in();
+  LogReader reader(arguments.in);
+  reader.require_events();
+  LogWriter writer(arguments.out.path);
+  std::map<std::string, int64_t> converted;
+  std::vector<uint8_t> bytes;
+  while (const std::optional<LogEvent> event = reader.next()) {
+    const TypeConverter::Result result = converter(event->data, bytes);
+    const bool changed = result == TypeConverter::Result::kConverted;
+    writer.write(event->channel, event->timestamp_us, changed ? std::span<const uint8_t>(bytes) : event->data);
+    if (changed) ++converted[*converter.old_name(read_int64(event->data.data()))];
+    if (result == TypeConverter::Result::kBroken) {
+      say("log", fmt::format("{}: byte {}: {}: no message of {}; kept as it is", arguments.in, event->offset,
+                             event->channel, *converter.old_name(read_int64(event->data.data()))));
+    }
+  }
+  writer.commit();
+  print_damage(arguments, reader.damage());
+  for (const auto& [name, count] : converted) std::cout << fmt::format("{}: {} messages\n", name, count);
+  std::cout << fmt::format("{}: {} events{}\n", arguments.out.path.string(), writer.events(),
+                           converted.empty() ? ", nothing to convert" : "");
+}
+
 }  // namespace
 
 void add_log_command(CLI::App& app) {
   const auto arguments = std::make_shared<LogArguments>();
-  CLI::App* log = app.add_subcommand("log", "Look at logs, cut, filter and repair them");
+  CLI::App* log = app.add_subcommand("log", "Look at logs, cut, filter, repair and convert them");
   log->require_subcommand(1);
   const auto add = [&](const std::string& name, const std::string& what, bool writes) {
     CLI::App* command = log->add_subcommand(name, what);
@@ -150,6 +184,8 @@ void add_log_command(CLI::App& app) {
   add("repair", "Copy all intact events", true)->callback([arguments] {
     copy_log(*arguments, [](const LogEvent&) { return true; });
   });
+  add("convert", "Copy with messages of earlier versions' types as messages of today's (docs/TYPES.md)", true)
+      ->callback([arguments] { convert_log(*arguments); });
   CLI::App* cut = add("cut", "Copy a stretch of time", true);
   cut->add_option("--from-s", arguments->from_s, "Seconds after the first message");
   cut->add_option("--to-s", arguments->to_s, "Seconds after the first message, exclusive");

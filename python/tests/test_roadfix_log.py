@@ -281,6 +281,15 @@ class Demo(unittest.TestCase):
         self.assertEqual(run(ROOT / "logs/nowhere.lcm").returncode, 2)
 
 
+class Released(unittest.TestCase):
+    def test_a_log_of_0_1_is_read_with_the_types_of_0_1(self):
+        log = roadfix_log.read(ROOT / "logs/released/0.1.lcm", ["*"])
+        self.assertEqual((log.damage, log.unknown), ([], {}))
+        tracks = log["VO_FEATURES"]
+        self.assertEqual((tracks.type, tracks.messages, tracks.broken), ("vo_features_t", 9, []))
+        np.testing.assert_array_equal(tracks.u_px.lengths, tracks.num_features)
+
+
 class Install(unittest.TestCase):
     def test_pip_installs_a_checkout_without_the_network(self):
         try:

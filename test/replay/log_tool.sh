@@ -40,4 +40,19 @@ for stretch in '--from-s 10 --to-s 5' '--from-s 5 --to-s 5' '--to-s -1' '--from-
   [[ $status -eq 2 && ! -e $folder/x.lcm ]] && grep -q 'ends before it begins' "$folder/said" || fail "cut $stretch ends with $status"
 done
 tool cut "$log" --from-s -5 --to-s inf --out "$folder/all.lcm" && [[ $(events "$folder/all.lcm") == "$(events "$log")" ]] || fail 'a stretch beyond both ends is not the whole'
+# A log of 0.1 becomes one of today, and one of today stays as it is, byte for byte.
+released=${log%/*}/released/0.1.lcm
+tool info "$released" && grep -q 'log convert' "$folder/said" || fail 'info does not tell what makes an old log a new one'
+tool convert "$released" --out "$folder/today.lcm" && grep -q '^vo_features_t of 0.1: 9 messages' "$folder/said" || fail 'convert converts nothing'
+[[ $(events "$folder/today.lcm") == "$(events "$released")" ]] || fail 'convert loses events'
+tool check "$folder/today.lcm" || [[ $(grep -c undecodable "$folder/said") == $(grep -c ' 0 undecodable' "$folder/said") ]] || fail 'what was converted is undecodable'
+tool convert "$folder/today.lcm" --out "$folder/same.lcm" && grep -q 'nothing to convert' "$folder/said" || fail 'convert converts twice'
+cmp -s "$folder/today.lcm" "$folder/same.lcm" || fail 'convert changes what is of today'
+status=0; tool convert "$released" --out "$released" || status=$?
+[[ $status -eq 2 ]] || fail "converting a log into itself ends with $status"
+head -c 100000 "$released" >"$folder/short.lcm"
+tool convert "$folder/short.lcm" --out "$folder/converted.lcm" && grep -q 'hold no intact event: the last event is cut off' "$folder/said" || fail 'convert does not tell of a cut'
+printf 'no log' >"$folder/none.lcm"
+status=0; tool convert "$folder/none.lcm" --out "$folder/never.lcm" || status=$?
+[[ $status -eq 2 && ! -e $folder/never.lcm && ! -e $folder/never.lcm.part ]] || fail "converting no log ends with $status"
 echo "$(events "$log") events"
