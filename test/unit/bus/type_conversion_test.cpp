@@ -81,8 +81,8 @@ TEST_CASE("type conversion: copied, filled, renamed, widened and nested fields")
   REQUIRE(converter(old_track().bytes, out) == TypeConverter::Result::kConverted);
   CHECK(fields_of(out) == std::map<std::string, std::string>{{"utime", "123"},
                                                              {"n", "2"},
-                                                             {"label", "\"left\""},
-                                                             {"note", "\"\""},
+                                                             {"label", "'left'"},
+                                                             {"note", "''"},
                                                              {"u_px[0]", "1.5"},
                                                              {"u_px[1]", "2.5"},
                                                              {"sigma_px[0]", "0.5"},
