@@ -1,8 +1,5 @@
 // roadfix evaluate: how good is what a log's estimates say?
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -11,6 +8,7 @@
 #include "geometry/frames.h"
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
+#include "roadfix/evaluate/evaluate_log.h"
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/evaluate/report.h"
 
@@ -30,78 +28,17 @@ struct Options {
   std::filesystem::path json;
 };
 
-EvaluationOptions evaluation_options(const Options& options) {
-  EvaluationOptions out;
-  out.fit_delay = options.fit_delay;
-  out.turn_threshold = options.turn_degps * kDegree;
-  out.usable_within = options.usable_m;
-  if (options.align == "none") out.alignment = Alignment::kNone;
-  if (options.align == "yaw") out.alignment = Alignment::kYaw;
-  if (options.align == "se3") out.alignment = Alignment::kSe3;
-  if (options.align == "sim3") out.alignment = Alignment::kSim3;
-  if (options.align == "tied") out.alignment = Alignment::kTied;
-  if (options.tie_us != 0) out.tie_us = options.tie_us;
+EvaluationRequest request_of(const Options& options) {
+  EvaluationRequest out;
+  out.log = options.log;
+  out.reference = options.reference;
+  out.channels = options.channels;
+  out.options.fit_delay = options.fit_delay;
+  out.options.turn_threshold = options.turn_degps * kDegree;
+  out.options.usable_within = options.usable_m;
+  out.options.alignment = alignment_named(options.align);
+  if (options.tie_us != 0) out.options.tie_us = options.tie_us;
   return out;
-}
-
-/// The channels asked for, each of which must be there; all estimates where none was named.
-std::vector<std::string> chosen_channels(const Options& options, const EvaluationLog& log) {
-  std::vector<std::string> chosen;
-  for (const std::string& channel : options.channels) {
-    if (std::find(chosen.begin(), chosen.end(), channel) == chosen.end()) chosen.push_back(channel);
-  }
-  if (chosen.empty()) {
-    for (const auto& [channel, stream] : log.poses) {
-      if (channel != "REFERENCE") chosen.push_back(channel);
-    }
-  }
-  if (chosen.empty()) throw EvaluationLogError(options.log.string() + ": no POSE_* channel to evaluate");
-  for (const std::string& channel : chosen) static_cast<void>(poses_of(log, channel, options.log));
-  return chosen;
-}
-
-EstimateInput estimate_input(const std::string& channel, PoseStream stream, const PoseStream& reference,
-                             const EvaluationLog& truth, EvaluationReport& report) {
-  if (reference.anchor) move_to_anchor(stream, *reference.anchor);
-  EstimateInput input;
-  input.channel = channel;
-  input.local_frame = stream.local_frame || reference.local_frame;
-  input.scale_unknown = stream.scale_unknown;
-  input.lever_arm = lever_arm_between(stream.origin, reference.origin, truth.calibration, report.notes);
-  input.latencies = std::move(stream.latencies);
-  input.trajectory = std::move(stream.trajectory);
-  if (stream.backward + stream.other_frame > 0) {
-    report.notes.push_back(
-        fmt::format("{}: {} poses for a time that has one already and {} in another frame are left out", channel,
-                    stream.backward, stream.other_frame));
-  }
-  return input;
-}
-
-EvaluationReport evaluate(const Options& options) {
-  const std::filesystem::path& truth_path = options.reference.empty() ? options.log : options.reference;
-  EvaluationLog log = read_evaluation_log(options.log, {options.channels.begin(), options.channels.end()});
-  const EvaluationLog other =
-      options.reference.empty() ? EvaluationLog{} : read_evaluation_log(truth_path, {"REFERENCE"});
-  const EvaluationLog& truth = options.reference.empty() ? log : other;
-  EvaluationReport report;
-  report.facts = truth.facts;
-  report.notes = log.notes;
-  if (!options.reference.empty()) report.notes.insert(report.notes.end(), other.notes.begin(), other.notes.end());
-  report.reference = reference_of(truth, truth_path);
-  if (!truth.has_facts) {
-    report.notes.push_back(truth_path.string() + ": no CONFIG_DRIVE; the whole reference is scored");
-    report.facts.first_fix_us = report.reference.trajectory.poses.front().t_us;
-  }
-  const PoseStream& reference = truth.poses.at("REFERENCE");
-  for (const std::string& channel : chosen_channels(options, log)) {
-    EstimateInput input = estimate_input(channel, std::move(log.poses.at(channel)), reference, truth, report);
-    if (channel == "POSE_FUSED") input.modes = log.fusion.modes;
-    report.channels.push_back(
-        evaluate_channel(report.reference, report.facts, std::move(input), evaluation_options(options)));
-  }
-  report.fusion = std::move(log.fusion);
-  return report;
 }
 
 void run(const Options& options) {
@@ -112,7 +49,7 @@ void run(const Options& options) {
     throw EvaluationLogError(options.json.string() + ": --json is where the page goes");
   options.out.refuse_existing_file(page, options.log);
   if (!options.json.empty()) options.out.refuse_existing_file(options.json, options.log);
-  const EvaluationReport report = evaluate(options);
+  const EvaluationReport report = evaluate_log(request_of(options));
   const std::string json = report_json(report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   write_text_file(folder / "figures.json", json);
   if (!options.json.empty()) write_text_file(options.json, json);
@@ -137,7 +74,7 @@ void add_evaluate_command(CLI::App& app) {
       ->add_option(
           "--align", options->align,
           "auto: none for ENU, yaw for an own frame, sim3 without scale; tied: yaw and position of the reference once")
-      ->check(CLI::IsMember({"auto", "none", "yaw", "se3", "sim3", "tied"}))
+      ->check(CLI::IsMember(alignment_choices()))
       ->capture_default_str();
   command->add_option("--tie-us", options->tie_us, "when tied; before the first outage where not given");
   command->add_flag("--fit-latency", options->fit_delay, "fit the reference's constant latency first, within 2 s");
