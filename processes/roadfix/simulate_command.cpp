@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <ctime>
 #include <functional>
 #include <iostream>
@@ -16,6 +15,7 @@
 #include "roadfix/console.h"
 #include "roadfix/import/drive_log.h"
 #include "roadfix/simulate/scenario_file.h"
+#include "roadfix/simulate/scenario_request.h"
 #include "roadfix/simulate/simulated_log.h"
 #include "simulation/scenarios.h"
 #include "stream/thread_pool.h"
@@ -24,19 +24,14 @@ namespace roadfix {
 namespace {
 
 struct Options {
-  std::string scenario;
+  ScenarioRequest request;
   std::uint64_t seed = 1;
   OutputOption out;
   std::filesystem::path vehicle;
-  double duration_s = 0.0;
   bool mono = false;
   bool stereo = false;
   bool no_camera = false;
-  double camera_rate_hz = 0.0;
-  std::string picture_size;
-  bool png = false;
   int threads = 0;
-  std::vector<std::string> faults;
   bool list = false;
   bool print_config = false;
   bool progress = false;
@@ -56,21 +51,6 @@ void print_list() {
   }
 }
 
-void set_camera(const Options& options, CameraConfig& camera) {
-  if (options.mono) camera.layout = CameraLayout::kMono;
-  if (options.stereo) camera.layout = CameraLayout::kStereo;
-  if (options.no_camera) camera.layout = CameraLayout::kNone;
-  if (options.camera_rate_hz > 0.0) camera.rate_hz = options.camera_rate_hz;
-  if (options.png) camera.lossless = true;
-  if (options.picture_size.empty()) return;
-  int width = 0;
-  int height = 0;
-  char end = 0;
-  if (std::sscanf(options.picture_size.c_str(), "%4dx%4d%c", &width, &height, &end) != 2 || width < 64 || height < 48)
-    throw std::runtime_error("--picture-size is WIDTHxHEIGHT, at least 64x48, not " + options.picture_size);
-  camera = with_size(camera, width, height);
-}
-
 std::function<void(std::size_t)> shown_on(ProgressLine& line, std::size_t exposures) {
   const auto begin = std::chrono::steady_clock::now();
   return [&line, exposures, begin](std::size_t done) {
@@ -81,19 +61,14 @@ std::function<void(std::size_t)> shown_on(ProgressLine& line, std::size_t exposu
 }
 
 ScenarioConfig configured(const Options& options) {
-  if (options.scenario.empty()) throw std::runtime_error("which scenario? (--list shows all)");
-  ScenarioConfig config = load_scenario(options.scenario);
-  if (options.duration_s > 0.0) config.duration_s = options.duration_s;
-  set_camera(options, config.camera);
-  for (const std::string& text : options.faults) {
-    config.faults.push_back(parse_fault(text));
-    const Fault& fault = config.faults.back();
-    const bool blind = fault.sensor == Sensor::kCamera && config.camera.layout == CameraLayout::kNone;
-    if (fault.start_s < config.duration_s && !blind) continue;
-    say("simulate",
-        fmt::format("fault {} never acts: {}", text,
-                    blind ? "there is no camera" : fmt::format("the drive ends at {} s", config.duration_s)));
-  }
+  ScenarioRequest request = options.request;
+  if (request.scenario.empty()) throw std::runtime_error("which scenario? (--list shows all)");
+  if (options.mono) request.camera = CameraLayout::kMono;
+  if (options.stereo) request.camera = CameraLayout::kStereo;
+  if (options.no_camera) request.camera = CameraLayout::kNone;
+  std::vector<std::string> remarks;
+  const ScenarioConfig config = configured_scenario(request, remarks);
+  for (const std::string& remark : remarks) say("simulate", remark);
   return config;
 }
 
@@ -105,7 +80,7 @@ void run(const Options& options) {
     return;
   }
   if (options.out.path.empty()) throw std::runtime_error("--out DRIVE.lcm is missing");
-  options.out.refuse_existing(std::filesystem::path(options.scenario));
+  options.out.refuse_existing(std::filesystem::path(options.request.scenario));
   const auto begin = std::chrono::steady_clock::now();
   const SimulatedDrive drive = simulate(config, options.seed);
   if (!options.vehicle.empty()) {
@@ -136,21 +111,22 @@ void run(const Options& options) {
 void add_simulate_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("simulate", "Make a drive log whose truth is known exactly");
-  command->add_option("scenario", options->scenario, "name of a scenario, or a YAML file");
+  command->add_option("scenario", options->request.scenario, "name of a scenario, or a YAML file");
   command->add_option("--seed", options->seed, "of every random number")->capture_default_str();
   add_output(*command, options->out, "the log to write")->required(false);
   command->add_option("--vehicle", options->vehicle, "folder for calibration.yaml");
-  command->add_option("--duration", options->duration_s, "s, in place of the scenario's own")
+  command->add_option("--duration", options->request.duration_s, "s, in place of the scenario's own")
       ->check(CLI::Range(1.0, 86400.0));
   auto* mono = command->add_flag("--mono", options->mono, "with one camera");
   auto* stereo = command->add_flag("--stereo", options->stereo, "with two cameras")->excludes(mono);
   command->add_flag("--no-camera", options->no_camera, "without the scenario's cameras")->excludes(mono, stereo);
-  command->add_option("--camera-rate-hz", options->camera_rate_hz, "pictures a second")->check(CLI::Range(0.1, 100.0));
-  command->add_option("--picture-size", options->picture_size, "WIDTHxHEIGHT in px; the field of view stays");
-  command->add_flag("--png", options->png, "exact pictures instead of JPEG");
+  command->add_option("--camera-rate-hz", options->request.camera_rate_hz, "pictures a second")
+      ->check(CLI::Range(0.1, 100.0));
+  command->add_option("--picture-size", options->request.picture_size, "WIDTHxHEIGHT in px; the field of view stays");
+  command->add_flag("--png", options->request.lossless, "exact pictures instead of JPEG");
   command->add_option("--threads", options->threads, "that draw; the bytes do not depend on it (default: all)")
       ->check(CLI::Range(1, 256));
-  command->add_option("--fault", options->faults, "NAME@START[+DURATION][:KEY=VALUE,...]; may be given again")
+  command->add_option("--fault", options->request.faults, "NAME@START[+DURATION][:KEY=VALUE,...]; may be given again")
       ->allow_extra_args(false);
   command->add_flag("--list", options->list, "show scenarios and faults");
   command->add_flag("--print-config", options->print_config, "show the scenario's values as YAML");
