@@ -11,6 +11,7 @@ void add_calibrate_command(CLI::App& app);
 void add_doctor_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_export_command(CLI::App& app);
+void add_fleet_command(CLI::App& app);
 void add_import_command(CLI::App& app);
 void add_kalibr_command(CLI::App& calibrate);
 void add_log_command(CLI::App& app);

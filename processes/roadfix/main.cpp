@@ -67,6 +67,7 @@ int main(int argc, char** argv) {
   roadfix::add_doctor_command(app);
   roadfix::add_evaluate_command(app);
   roadfix::add_export_command(app);
+  roadfix::add_fleet_command(app);
   roadfix::add_import_command(app);
   roadfix::add_log_command(app);
   roadfix::add_replay_command(app);
