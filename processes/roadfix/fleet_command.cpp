@@ -58,6 +58,8 @@ void finish(int status) {
 
 void run(RunOptions& options) {
   FleetRequest& request = options.request;
+  if (!options.config.empty() && !options.configs.empty())
+    throw std::runtime_error("--config and --configs: one of them");
   if (!options.config.empty()) request.configs = {options.config};
   if (!options.configs.empty()) request.configs = folders_matching(options.configs);
   read_alignments(options, request.plan);
@@ -136,11 +138,9 @@ void add_engine_options(CLI::App& command, EngineOptions& engine) {
 void add_task_options(CLI::App& command, RunOptions& options) {
   FleetPlan& plan = options.request.plan;
   add_stages(command, plan.stages, "Stages, separated by commas")->required();
-  auto* config = command.add_option(
-      "--config", options.config,
-      "The vehicle's configuration folder; without a calibration.yaml in it each drive's own is used");
-  command.add_option("--configs", options.configs, "pattern of folders: every drive with each of them")
-      ->excludes(config);
+  command.add_option("--config", options.config,
+                     "The vehicle's configuration folder; without a calibration.yaml in it each drive's own is used");
+  command.add_option("--configs", options.configs, "pattern of such folders: every drive with each of them");
   add_channels(command, plan.channels, "What to score; every POSE_* channel where none is named");
   command.add_option("--align", options.aligned, "CHANNEL=ALIGNMENT, as `roadfix evaluate --align`");
   command.add_flag("--fit-latency", plan.fit_delay, "as `roadfix evaluate --fit-latency`");

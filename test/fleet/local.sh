@@ -103,7 +103,7 @@ keyed)
   touch "$folder/one.lcm"; "$roadfix" fleet resume "$run" >/dev/null
   [[ $(attempts) == '1 1 ' ]] || fail 'a touched input was run again'
   first=$(digests "$run")
-  "$roadfix" log cut "$log" --to-s 15 --out "$folder/two.lcm" >/dev/null
+  "$roadfix" log cut "$log" --to-s 15 --overwrite --out "$folder/two.lcm" >/dev/null
   told "$run" 'two.lcm\): of another input' || fail 'the other input is not told'
   "$roadfix" fleet resume "$run" >/dev/null 2>&1
   [[ $(attempts) == '1 2 ' ]] || fail "another input: attempts $(attempts)"

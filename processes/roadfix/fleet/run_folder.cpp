@@ -140,8 +140,7 @@ bool RunFolder::exists() const { return fs::exists(path_ / "fleet.json"); }
 void RunFolder::create(const FleetPlan& plan, const std::vector<FleetTask>& tasks) const {
   if (exists()) {
     throw std::runtime_error(
-        fmt::format("{}: is a fleet run already: `roadfix fleet resume {}` goes on with it; --out takes another folder "
-                    "for a new one",
+        fmt::format("{}: is there already; --overwrite replaces it, `roadfix fleet resume {}` goes on with it",
                     path_.string(), path_.string()));
   }
   std::string lines;
