@@ -58,8 +58,6 @@ find_package(Threads REQUIRED)
 
 find_package(OpenCV QUIET CONFIG COMPONENTS core imgproc imgcodecs features2d calib3d video dnn videoio)
 roadfix_require(OpenCV_FOUND libopencv-dev)
-find_package(embree 3.13 QUIET CONFIG)
-roadfix_require(embree_FOUND libembree-dev)
 
 find_package(Ceres 2.1 QUIET CONFIG)
 roadfix_require(Ceres_FOUND libceres-dev)

@@ -1,4 +1,4 @@
-/// Embree against Mesa's software rasteriser on the same faces and camera: visibility and depth only, no texture, no
+/// The scene's rays against Mesa's software rasteriser on the same faces and camera: depth only, no texture, no
 /// shadow, no distortion (which a rasteriser would have to resample). Prints milliseconds a picture of each, one
 /// thread, and the share of pixels on which their depths agree. Built where libosmesa6-dev is installed.
 ///   LP_NUM_THREADS=0 mesa_compare
@@ -42,7 +42,7 @@ class Rasteriser {
         OSMesaMakeCurrent(context_, colour_.data(), GL_UNSIGNED_BYTE, lens.width, lens.height) == GL_FALSE)
       throw std::runtime_error("mesa_compare: no off-screen context");
     for (const Face& f : world.faces) {
-      for (const std::size_t k : {0U, 1U, 3U, 1U, 2U, 3U}) {  // the triangles that Embree makes of a quad
+      for (const std::size_t k : {0U, 1U, 3U, 1U, 2U, 3U}) {  // the halves of a face
         for (int i = 0; i < 3; ++i) vertices_.push_back(static_cast<float>(f.corner[k][i]));
         shades_.insert(shades_.end(), 3, f.light[k]);
       }
@@ -97,21 +97,13 @@ class Rasteriser {
 
 std::vector<float> cast(RayScene& scene, const CameraIntrinsics& lens, const View& view) {
   const RayWindow& window = scene.prepare(view.T_enu_camera.p, view.t_s, RayUse::kPoints);
-  const Eigen::Vector3f eye = (view.T_enu_camera.p - window.origin()).cast<float>();
-  const Eigen::Matrix3f R = view.T_enu_camera.R().cast<float>();
-  std::vector<float> out(static_cast<std::size_t>(lens.width * lens.height));
+  const Eigen::Vector3d eye = view.T_enu_camera.p - window.origin();
+  std::vector<float> out;
   for (int v = 0; v < lens.height; ++v) {
-    const float y = static_cast<float>((v - lens.cy) / lens.fy);
-    for (int u = 0; u < lens.width; u += kLanes) {
-      const int count = std::min(kLanes, lens.width - u);
-      F8 x;
-      for (int i = 0; i < kLanes; ++i) x[i] = static_cast<float>((u + i - lens.cx) / lens.fx);
-      const HitLanes hit =
-          window.intersect({{splat(eye.x()), splat(eye.y()), splat(eye.z())},
-                            {R(0, 0) * x + (R(0, 1) * y + R(0, 2)), R(1, 0) * x + (R(1, 1) * y + R(1, 2)),
-                             R(2, 0) * x + (R(2, 1) * y + R(2, 2))}});
-      store(&out[static_cast<std::size_t>(v * lens.width + u)],
-            select(hit.face < 0, splat(std::numeric_limits<float>::infinity()), hit.distance), count);
+    for (int u = 0; u < lens.width; ++u) {
+      const Eigen::Vector3d direction((u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0);
+      const RayHit hit = window.nearest(eye, view.T_enu_camera.q * direction);
+      out.push_back(hit.triangle < 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(hit.distance));
     }
   }
   return out;
@@ -126,28 +118,28 @@ void compare(const char* name) {
   const CameraIntrinsics& lens = rig.camera.intrinsics();
   const World world = world_of(drive);
   Rasteriser mesa(world, lens);
-  RayScene embree(world);
+  RayScene rays(world);
   double mesa_ms = 0.0;
-  double embree_ms = 0.0;
+  double rays_ms = 0.0;
   std::size_t agree = 0;
   std::size_t all = 0;
-  for (int k = -1; k < kPictures; ++k) {  // the first one makes Embree's tree and Mesa's code
+  for (int k = -1; k < kPictures; ++k) {  // the first one makes the tree and Mesa's code
     const View view = view_at(drive, rig.T_vehicle_left, drive.exposures[static_cast<std::size_t>(201 + k)]);
     const double begin = cpu_ms();
     const auto a = mesa.draw(view);
     const double middle = cpu_ms();
-    const auto b = cast(embree, lens, view);
+    const auto b = cast(rays, lens, view);
     if (k < 0) continue;
     mesa_ms += (middle - begin) / kPictures;
-    embree_ms += (cpu_ms() - middle) / kPictures;
+    rays_ms += (cpu_ms() - middle) / kPictures;
     for (std::size_t i = 0; i < a.size(); ++i) {
       const bool same_sky = !(a[i] < 400.0F) && !(b[i] < 400.0F);
       agree += same_sky || std::abs(a[i] - b[i]) < 0.01F * b[i] ? 1U : 0U;
     }
     all += a.size();
   }
-  std::printf("%-12s %6zu faces  mesa %6.1f ms  embree %6.1f ms  depths agree on %.2f %%\n", name, world.faces.size(),
-              mesa_ms, embree_ms, 100.0 * static_cast<double>(agree) / static_cast<double>(all));
+  std::printf("%-12s %6zu faces  mesa %6.1f ms  rays %6.1f ms  depths agree on %.2f %%\n", name, world.faces.size(),
+              mesa_ms, rays_ms, 100.0 * static_cast<double>(agree) / static_cast<double>(all));
 }
 
 }  // namespace

@@ -108,16 +108,6 @@ inline F8 fused(F8 a, F8 b, F8 c) {
   return c;
 #endif
 }
-/// One over x to the last bit or two: the processor's estimate and one step of Newton's. The estimate differs between
-/// makers of processors.
-inline F8 reciprocal(F8 x) {
-#ifdef __FMA__
-  const auto estimate = (F8)_mm256_rcp_ps((__m256)x);
-  return fused(estimate, fused(-x, estimate, splat(1.0F)), estimate);
-#else
-  return 1.0F / x;
-#endif
-}
 inline F8 mix(F8 a, F8 b, F8 share) { return a + (b - a) * share; }
 inline F8 to_float(I8 x) { return __builtin_convertvector(x, F8); }
 inline I8 to_int(F8 x) { return __builtin_convertvector(x, I8); }

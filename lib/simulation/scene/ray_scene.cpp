@@ -1,16 +1,11 @@
 #include "simulation/scene/ray_scene.h"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <list>
-#include <numeric>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <tuple>
 #include <utility>
 
@@ -24,7 +19,8 @@ constexpr double kWindowRadius_m = 450.0;  // the haze covers what appears there
 constexpr int kWindowsKept = 3;            // both cameras of a rig may sit astride a grid line
 constexpr double kStillCell_m = 2.0;       // of the grid across the sun's rays: a window has 500 x 500
 constexpr double kMovingCell_m = 8.0;      // about a car
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr double kReach = 1e4;             // lengths of a ray's direction: far beyond a window
+constexpr double kShort_m = 0.02;  // by which a ray to a point ends before it, so that its own surface does not hide it
 
 Float3 floats(const Eigen::Vector3d& x) {
   return {static_cast<float>(x.x()), static_cast<float>(x.y()), static_cast<float>(x.z())};
@@ -67,58 +63,6 @@ std::array<Float3, 4> seen_from(const Eigen::Vector3d& origin, const Face& f, co
   return out;
 }
 
-/// Quads under one Embree scene; corners in window coordinates. The quality is of the tree alone, the hits do not
-/// depend on it.
-class QuadScene {
- public:
-  QuadScene() = default;
-  QuadScene(RTCDevice device, std::span<const std::array<Float3, 4>> faces, RTCBuildQuality quality) {
-    if (faces.empty()) return;
-    scene_ = rtcNewScene(device);
-    rtcSetSceneBuildQuality(scene_, quality);
-    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_QUAD);
-    auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), 4 * faces.size()));
-    auto* index = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
-                                                                 4 * sizeof(unsigned), faces.size()));
-    for (const auto& face : faces)
-      for (const Float3& corner : face) vertex = std::copy(corner.begin(), corner.end(), vertex);
-    std::iota(index, index + 4 * faces.size(), 0U);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene_, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene_);
-  }
-  QuadScene(QuadScene&& other) noexcept : scene_(std::exchange(other.scene_, nullptr)) {}
-  QuadScene& operator=(QuadScene&& other) noexcept {
-    std::swap(scene_, other.scene_);
-    return *this;
-  }
-  ~QuadScene() {
-    if (scene_ != nullptr) rtcReleaseScene(scene_);
-  }
-  [[nodiscard]] RTCScene get() const { return scene_; }
-
- private:
-  RTCScene scene_ = nullptr;
-};
-
-void fill(RTCRay8& out, const RayLanes& rays, float reach) {
-  const auto copy = [](const auto& from, auto& to) { std::memcpy(to, &from, sizeof to); };
-  copy(rays.origin.x, out.org_x);
-  copy(rays.origin.y, out.org_y);
-  copy(rays.origin.z, out.org_z);
-  copy(rays.direction.x, out.dir_x);
-  copy(rays.direction.y, out.dir_y);
-  copy(rays.direction.z, out.dir_z);
-  copy(splat(reach), out.tfar);
-  std::memset(out.tnear, 0, sizeof out.tnear);
-  std::memset(out.time, 0, sizeof out.time);
-  std::memset(out.mask, 0xFF, sizeof out.mask);
-  std::memset(out.id, 0, sizeof out.id);
-  std::memset(out.flags, 0, sizeof out.flags);
-}
-
 }  // namespace
 
 struct RayWindow::Impl {
@@ -129,8 +73,8 @@ struct RayWindow::Impl {
   std::vector<Triangle> triangles;
   std::size_t num_static = 0;
   double t_s = std::numeric_limits<double>::quiet_NaN();
-  QuadScene still;
-  QuadScene moving;
+  std::optional<TriangleTree> still;  // made when single rays ask for them
+  std::optional<TriangleTree> moving;
   Float3 to_sun{};
   std::optional<SunGrid> still_shadows;  // made when pictures ask for them
   std::optional<SunGrid> moving_shadows;
@@ -141,11 +85,13 @@ struct RayWindow::Impl {
     const auto halves = triangles_of(corner);
     triangles.insert(triangles.end(), halves.begin(), halves.end());
   }
-  [[nodiscard]] I8 occluded(const RayLanes& rays, I8 active, float reach) const;
   /// Of the faces [first, last).
+  [[nodiscard]] std::span<const Triangle> triangles_between(std::size_t first, std::size_t last) const {
+    return std::span(triangles).subspan(2 * first, 2 * (last - first));
+  }
   [[nodiscard]] SunGrid shadows(std::size_t first, std::size_t last, double cell_m) const {
-    const auto at = [this](std::size_t face) { return triangles.begin() + static_cast<std::ptrdiff_t>(2 * face); };
-    return {to_sun, {at(first), at(last)}, cell_m};
+    const auto part = triangles_between(first, last);
+    return {to_sun, {part.begin(), part.end()}, cell_m};
   }
 };
 
@@ -157,87 +103,28 @@ const std::vector<std::array<Float3, 4>>& RayWindow::corners() const { return im
 const std::vector<Triangle>& RayWindow::triangles() const { return impl_->triangles; }
 
 I8 RayWindow::shaded(const Lanes3& point, I8 active, float reach_m) const {
-  const SunGrid::Shade still = impl_->still_shadows->shaded(point, active, reach_m);
-  const SunGrid::Shade moving = impl_->moving_shadows->shaded(point, active & ~still.dark, reach_m);
-  const I8 dark = still.dark | moving.dark;
-  const I8 doubtful = (still.doubtful | moving.doubtful) & ~dark;
-  return any(doubtful) ? impl_->occluded({point, splat(impl_->to_sun)}, active, reach_m) : dark;
+  const I8 still = impl_->still_shadows->shaded(point, active, reach_m);
+  return still | impl_->moving_shadows->shaded(point, active & ~still, reach_m);
 }
 
-HitLanes RayWindow::intersect(const RayLanes& rays) const {
-  RTCRayHit8 query;
-  fill(query.ray, rays, kInfinity);
-  for (int i = 0; i < kLanes; ++i) {
-    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-    query.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
-  }
-  alignas(32) int valid[kLanes];
-  std::fill_n(valid, kLanes, -1);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  HitLanes hit{};
-  if (impl_->still.get() != nullptr) rtcIntersect8(valid, impl_->still.get(), &context, &query);
-  for (int i = 0; i < kLanes; ++i) {
-    hit.face[i] = query.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(query.hit.primID[i]);
-    query.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-  }
-  if (impl_->moving.get() != nullptr) rtcIntersect8(valid, impl_->moving.get(), &context, &query);
-  for (int i = 0; i < kLanes; ++i) {
-    if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
-      hit.face[i] = static_cast<int>(impl_->num_static + query.hit.primID[i]);
-    }
-    hit.distance[i] = query.ray.tfar[i];
-    hit.u[i] = query.hit.u[i];
-    hit.v[i] = query.hit.v[i];
-  }
-  return hit;
-}
-
-I8 RayWindow::Impl::occluded(const RayLanes& rays, I8 active, float reach) const {
-  RTCRay8 query;
-  fill(query, rays, reach);
-  alignas(32) int valid[kLanes];
-  for (int i = 0; i < kLanes; ++i) valid[i] = active[i];
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  if (still.get() != nullptr) rtcOccluded8(valid, still.get(), &context, &query);
-  if (moving.get() != nullptr) rtcOccluded8(valid, moving.get(), &context, &query);
-  I8 blocked{};
-  for (int i = 0; i < kLanes; ++i) blocked[i] = active[i] != 0 && query.tfar[i] < 0.0F ? -1 : 0;
-  return blocked;
+RayHit RayWindow::nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+  const RayHit still = impl_->still->nearest(origin, direction, kReach);
+  RayHit moving = impl_->moving->nearest(origin, direction, still.triangle < 0 ? kReach : still.distance);
+  if (moving.triangle < 0 || (still.triangle >= 0 && still.distance <= moving.distance)) return still;
+  moving.triangle += static_cast<int>(2 * impl_->num_static);
+  return moving;
 }
 
 bool RayWindow::occluded(const Eigen::Vector3d& from_enu, const Eigen::Vector3d& to_enu) const {
-  const auto from = floats(from_enu - impl_->origin);
-  const auto step = floats(to_enu - from_enu);
-  RTCRay ray{};
-  ray.org_x = from[0];
-  ray.org_y = from[1];
-  ray.org_z = from[2];
-  ray.dir_x = step[0];
-  ray.dir_y = step[1];
-  ray.dir_z = step[2];
-  // Stops 2 cm short, so that the surface which the point lies on does not hide it.
-  ray.tfar = 1.0F - 0.02F / static_cast<float>((to_enu - from_enu).norm());
-  ray.mask = ~0U;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  if (impl_->still.get() != nullptr) rtcOccluded1(impl_->still.get(), &context, &ray);
-  if (impl_->moving.get() != nullptr && ray.tfar >= 0.0F) rtcOccluded1(impl_->moving.get(), &context, &ray);
-  return ray.tfar < 0.0F;
+  const Eigen::Vector3d from = from_enu - impl_->origin;
+  const Eigen::Vector3d way = to_enu - from_enu;
+  const double reach = 1.0 - kShort_m / way.norm();
+  return impl_->still->blocked(from, way, reach) || impl_->moving->blocked(from, way, reach);
 }
 
 struct RayScene::Impl {
   const World* world = nullptr;
-  RTCDevice device = nullptr;
   std::list<std::unique_ptr<RayWindow>> windows;  // newest first
-
-  ~Impl() {
-    windows.clear();
-    if (device != nullptr) rtcReleaseDevice(device);
-  }
 
   std::unique_ptr<RayWindow> make_window(const std::tuple<int, int, int>& cell) const {
     auto impl = std::make_unique<RayWindow::Impl>();
@@ -250,7 +137,6 @@ struct RayScene::Impl {
       impl->add(shade_of(f, SE3{}, Eigen::Vector3d::Zero()), seen_from(impl->origin, f, SE3{}));
     }
     impl->num_static = impl->faces.size();
-    impl->still = QuadScene(device, impl->corners, RTC_BUILD_QUALITY_HIGH);
     return std::make_unique<RayWindow>(std::move(impl));
   }
 
@@ -271,8 +157,14 @@ struct RayScene::Impl {
         window.add(shade, seen_from(window.origin, f, T_enu_car));
       }
     }
-    window.moving = QuadScene(device, std::span(window.corners).subspan(window.num_static), RTC_BUILD_QUALITY_LOW);
+    window.still.reset();  // the triangles may have moved in memory
+    window.moving.reset();
     window.moving_shadows.reset();
+  }
+
+  static void place_trees(RayWindow::Impl& window) {
+    if (!window.still) window.still.emplace(window.triangles_between(0, window.num_static));
+    if (!window.moving) window.moving.emplace(window.triangles_between(window.num_static, window.faces.size()));
   }
 
   static void place_shadows(RayWindow::Impl& window) {
@@ -282,11 +174,7 @@ struct RayScene::Impl {
   }
 };
 
-RayScene::RayScene(const World& world) : impl_(std::make_unique<Impl>()) {
-  impl_->world = &world;
-  impl_->device = rtcNewDevice("threads=1,isa=avx2");
-  if (impl_->device == nullptr) throw std::runtime_error("scene: Embree found no AVX2, which the same bits need");
-}
+RayScene::RayScene(const World& world) : impl_(std::make_unique<Impl>()) { impl_->world = &world; }
 RayScene::~RayScene() = default;
 
 const RayWindow& RayScene::prepare(const Eigen::Vector3d& p_enu_camera, double t_s, RayUse use) {
@@ -302,7 +190,11 @@ const RayWindow& RayScene::prepare(const Eigen::Vector3d& p_enu_camera, double t
     windows.splice(windows.begin(), windows, found);
   }
   impl_->place_movers(*windows.front()->impl_, t_s);
-  if (use == RayUse::kPictures) Impl::place_shadows(*windows.front()->impl_);
+  if (use == RayUse::kPictures) {
+    Impl::place_shadows(*windows.front()->impl_);
+  } else {
+    Impl::place_trees(*windows.front()->impl_);
+  }
   return *windows.front();
 }
 

@@ -3,15 +3,15 @@
 /// on what was asked before.
 ///
 /// Pictures look through tiles.h and towards the sun through sun_grid.h, which know that their rays share an origin or
-/// a direction. Any other ray goes to Embree, pinned to AVX2 and to building on the calling thread (DESIGN.md, section
-/// 5); it also tells the tests what the others must find.
+/// a direction; single rays walk through triangle_tree.h. All three propose triangles, and the doubles of triangle.h
+/// decide which is hit.
 #pragma once
 
 #include <array>
 #include <memory>
 #include <vector>
 
-#include "simulation/scene/triangle.h"
+#include "simulation/scene/triangle_tree.h"
 #include "simulation/scene/world.h"
 
 namespace roadfix {
@@ -44,9 +44,9 @@ struct HitLanes {
   F8 distance, u, v;
 };
 
-class RayWindow;  // one window's Embree scenes
+class RayWindow;
 
-/// What a window is made ready for: the grids towards the sun take as long as all the rest.
+/// What a window is made ready for: single rays want a tree, pictures the grids towards the sun.
 enum class RayUse { kPoints, kPictures };
 
 class RayScene {
@@ -78,7 +78,8 @@ class RayWindow {
   /// -1 where something lies between a point and `reach_m` further towards the sun; lanes not `active` give 0. Only in
   /// a window for pictures.
   [[nodiscard]] I8 shaded(const Lanes3& point, I8 active, float reach_m) const;
-  [[nodiscard]] HitLanes intersect(const RayLanes& rays) const;
+  /// What a ray from a place in window coordinates hits first. Only in a window for points, as the next.
+  [[nodiscard]] RayHit nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
   [[nodiscard]] bool occluded(const Eigen::Vector3d& from_enu, const Eigen::Vector3d& to_enu) const;
 
  private:

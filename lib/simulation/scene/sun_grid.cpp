@@ -10,7 +10,7 @@ namespace roadfix {
 namespace {
 
 constexpr double kMargin_m = 0.01;  // far above the rounding of floats within a window
-constexpr float kEdge_m = 1e-4F;    // floats 450 m from their origin are good to a third of this
+constexpr float kUnit = 1.0001F;    // length of the direction to the sun, at most
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 Eigen::Vector3d vector(const Float3& x) { return {x[0], x[1], x[2]}; }
@@ -20,8 +20,8 @@ Float3 floats(const Eigen::Vector3d& x) {
 F8 along(const Float3& axis, const Lanes3& p) { return axis[0] * p.x + axis[1] * p.y + axis[2] * p.z; }
 
 std::array<Eigen::Vector3d, 3> corners_of(const Triangle& t) {
-  const Eigen::Vector3d a = vector(t.corner);
-  return {a, a - vector(t.edge1), a + vector(t.edge2)};
+  const Eigen::Vector3d a = vector(t.corner[0]);
+  return {a, vector(t.corner[1]), vector(t.corner[2])};
 }
 
 }  // namespace
@@ -104,34 +104,56 @@ void SunGrid::for_cells(const Triangle& triangle, Use use) const {
   }
 }
 
-SunGrid::Shade SunGrid::shaded(const Lanes3& point, I8 active, float reach_m) const {
-  Shade shade{};
-  if (triangles_.empty()) return shade;
+bool SunGrid::blocked(std::size_t cell, const Float3& point, float height, float reach_m) const {
+  const std::array<double, 3> from{point[0], point[1], point[2]};
+  RayHit hit;
+  for (std::uint32_t at = begin_[cell]; at < begin_[cell + 1] && entries_[at].top >= height; ++at) {
+    const std::uint32_t i = entries_[at].triangle;
+    add_hit(sighted(triangles_[i], from), static_cast<int>(i), {to_sun_[0], to_sun_[1], to_sun_[2]}, reach_m, hit);
+    if (hit.triangle >= 0) return true;
+  }
+  return false;
+}
+
+I8 SunGrid::shaded(const Lanes3& point, I8 active, float reach_m) const {
+  I8 dark{};
+  if (triangles_.empty()) return dark;
   const F8 x = (along(across_[0], point) - begin_m_[0]) * cells_per_m_;
   const F8 y = (along(across_[1], point) - begin_m_[1]) * cells_per_m_;
-  I8 left =
+  const I8 over_grid =
       active & (x >= 0.0F) & (y >= 0.0F) & (x < static_cast<float>(size_[0])) & (y < static_cast<float>(size_[1]));
-  if (!any(left)) return shade;
+  if (!any(over_grid)) return dark;
   const F8 height = along(to_sun_, point);
-  const I8 cell = to_int(select(left, y, splat(0.0F))) * size_[0] + to_int(select(left, x, splat(0.0F)));
+  const I8 cell = to_int(select(over_grid, y, splat(0.0F))) * size_[0] + to_int(select(over_grid, x, splat(0.0F)));
   const Lanes3 sun = splat(to_sun_);
+  I8 left = over_grid;
+  I8 doubtful{};
   for (int i = 0; i < kLanes; ++i) {
     if (left[i] == 0) continue;
     const auto k = static_cast<std::size_t>(cell[i]);
-    I8 here = left & (cell == cell[i]);
+    const I8 here = left & (cell == cell[i]);
     const float lowest = smallest(select(here, height, splat(kInfinity)));
     for (std::uint32_t at = begin_[k]; at < begin_[k + 1] && entries_[at].top >= lowest; ++at) {
       const Triangle& t = triangles_[entries_[at].triangle];
-      const Lanes3 from_point{t.corner[0] - point.x, t.corner[1] - point.y, t.corner[2] - point.z};
-      const TriangleHit hit = meet(t, from_point, sun, splat(reach_m), kEdge_m);
-      shade.doubtful |= hit.at_edge & left;
-      shade.dark |= hit.valid & left & ~hit.at_edge;
-      if (!any(here & ~shade.dark)) break;
+      const Float3& corner = t.corner[0];
+      const Lanes3 from_point{corner[0] - point.x, corner[1] - point.y, corner[2] - point.z};
+      const F8 length = abs(from_point.x) + abs(from_point.y) + abs(from_point.z);
+      const Proposal hit = propose(t, from_point, length, sun, kUnit, splat(reach_m));
+      const I8 certain = hit.certain & (hit.far <= reach_m);
+      doubtful |= hit.possible & ~certain & here;
+      dark |= certain & here;
+      if (!any(here & ~dark)) break;
     }
-    left &= ~(here | shade.dark);
+    left &= ~here;
   }
-  shade.doubtful &= ~shade.dark;
-  return shade;
+  doubtful &= ~dark;
+  if (!any(doubtful)) return dark;
+  for (int i = 0; i < kLanes; ++i) {
+    if (doubtful[i] == 0) continue;
+    const Float3 at{point.x[i], point.y[i], point.z[i]};
+    if (blocked(static_cast<std::size_t>(cell[i]), at, height[i], reach_m)) dark[i] = -1;
+  }
+  return dark;
 }
 
 }  // namespace roadfix

@@ -14,12 +14,8 @@ class SunGrid {
   /// `to_sun` is a unit vector.
   SunGrid(const Float3& to_sun, std::vector<Triangle> triangles, double cell_m);
 
-  struct Shade {
-    I8 dark;      ///< -1 where a triangle lies between a point and `reach_m` further towards the sun
-    I8 doubtful;  ///< where rounding decides: the ray passes by the very edge of one
-  };
-  /// Only for active lanes.
-  [[nodiscard]] Shade shaded(const Lanes3& point, I8 active, float reach_m) const;
+  /// -1 where a triangle lies between a point and `reach_m` further towards the sun; lanes not `active` give 0.
+  [[nodiscard]] I8 shaded(const Lanes3& point, I8 active, float reach_m) const;
 
  private:
   struct Entry {
@@ -27,6 +23,7 @@ class SunGrid {
     std::uint32_t triangle;
   };
   void choose_grid(double cell_m);
+  [[nodiscard]] bool blocked(std::size_t cell, const std::array<float, 3>& point, float height, float reach_m) const;
   /// use(cell, top) for each cell that the triangle may lie over.
   template <class Use>
   void for_cells(const Triangle& triangle, Use use) const;

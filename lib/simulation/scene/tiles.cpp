@@ -11,7 +11,7 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNearest_m = 1e-3F;  // depth before which nothing is seen
 constexpr float kRounding = 4e-6F;   // of products of coordinates in floats, with a margin
-constexpr float kEdge_m = 2e-5F;     // rounding of floats 100 m from their origin, with a margin
+constexpr float kFarthest_m = 1e6F;  // depth; nothing is there
 constexpr float kShare = 1e-5F;      // margin of depths
 
 struct Interval {
@@ -81,6 +81,10 @@ TileGrid::Range TileGrid::between(float low, float high, const std::vector<float
 TileLists::TileLists(const TileGrid& grid, const RayWindow& window, const Eigen::Matrix3f& R,
                      const Eigen::Vector3f& eye)
     : grid_(grid), window_(window), eye_(eye), rows_(static_cast<std::size_t>(grid.rows())) {
+  const TileGrid::Bounds& all = grid.picture();
+  const float x = std::max(std::abs(all.x0), std::abs(all.x1));
+  const float y = std::max(std::abs(all.y0), std::abs(all.y1));
+  longest_ = 1.0001F * std::sqrt(x * x + y * y + 1.0F);
   const Eigen::Matrix3f R_camera_enu = R.transpose();
   const auto& corners = window.corners();
   for (std::uint32_t face = 0; face < corners.size(); ++face) {
@@ -155,8 +159,10 @@ void TileLists::add_triangle(std::uint32_t triangle, const Eigen::Vector3f& a, c
   }
   for (Eigen::Index k = 0; k < 3; ++k) s.inverse_depth[static_cast<std::size_t>(k)] = normal[k] / det;
   s.depth_slack = 2.0F * doubt + kRounding * normal.cwiseAbs().sum() / std::abs(det);
-  const Float3& first = window_.triangles()[triangle].corner;
+  const Float3& first = window_.triangles()[triangle].corner[0];
   s.from_eye = {first[0] - eye_.x(), first[1] - eye_.y(), first[2] - eye_.z()};
+  s.length = 1.0001F *
+             std::sqrt(s.from_eye[0] * s.from_eye[0] + s.from_eye[1] * s.from_eye[1] + s.from_eye[2] * s.from_eye[2]);
   seen_.push_back(s);
 }
 
@@ -210,42 +216,86 @@ void TileLists::fill(int row) {
 void TileLists::search(int row, int column, const Lanes3& direction, Nearest& nearest) const {
   const Row& list = rows_[static_cast<std::size_t>(row)];
   const auto k = static_cast<std::size_t>(column);
-  HitLanes& hit = nearest.hit;
-  float farthest = largest(hit.distance) * (1.0F + kShare);
+  float farthest = largest(nearest.far) * (1.0F + kShare);
   for (std::uint32_t at = list.begin[k]; at < list.begin[k + 1]; ++at) {
     const Entry& entry = list.entries[at];
     if (entry.nearest > farthest) break;
     const Seen& s = seen_[entry.seen];
-    const F8 reach = hit.distance * (1.0F + kShare);
-    const TriangleHit h = meet(window_.triangles()[s.triangle], splat(s.from_eye), direction, reach, kEdge_m);
-    nearest.doubtful |= h.at_edge;
-    if (!any(h.valid)) continue;
-    const F8 per_scale = reciprocal(h.scale);
-    const F8 distance = h.distance * per_scale;
+    const Proposal hit =
+        propose(window_.triangles()[s.triangle], splat(s.from_eye), splat(s.length), direction, longest_, nearest.far);
+    nearest.doubtful |= hit.possible & ~hit.certain;
+    if (!any(hit.certain)) continue;
     const auto triangle = static_cast<std::int32_t>(s.triangle);
-    nearest.doubtful |= h.valid & (distance * (1.0F + kShare) >= hit.distance) & (hit.face != triangle);
-    const I8 nearer = h.valid & (h.distance <= h.scale * hit.distance);
-    const F8 u = h.u * per_scale;
-    const F8 v = h.v * per_scale;
-    const bool second = (s.triangle & 1U) != 0;
-    hit.u = select(nearer, second ? 1.0F - u : u, hit.u);
-    hit.v = select(nearer, second ? 1.0F - v : v, hit.v);
-    hit.distance = select(nearer, distance, hit.distance);
-    hit.face = select(nearer, I8{} + triangle, hit.face);
-    farthest = largest(hit.distance) * (1.0F + kShare);
+    const I8 before = hit.certain & (hit.far < nearest.near);
+    const I8 beside = hit.certain & ~before & (hit.near <= nearest.far) & (nearest.triangle != triangle);
+    nearest.doubtful |= beside;
+    nearest.triangle = select(before, I8{} + triangle, nearest.triangle);
+    nearest.near = select(before | beside, min(hit.near, nearest.near), nearest.near);
+    nearest.far = select(before | beside, min(hit.far, nearest.far), nearest.far);
+    farthest = largest(nearest.far) * (1.0F + kShare);
   }
 }
 
+int TileLists::decide(int row, int column, const std::array<double, 3>& direction) const {
+  const Row& list = rows_[static_cast<std::size_t>(row)];
+  const auto k = static_cast<std::size_t>(column);
+  RayHit hit{-1, static_cast<double>(kFarthest_m)};
+  for (std::uint32_t at = list.begin[k]; at < list.begin[k + 1]; ++at) {
+    const Entry& entry = list.entries[at];
+    if (entry.nearest > hit.distance * (1.0 + kShare)) break;
+    const auto i = seen_[entry.seen].triangle;
+    add_hit(sighted(window_.triangles()[i], {eye_.x(), eye_.y(), eye_.z()}), static_cast<int>(i), direction,
+            kFarthest_m, hit);
+  }
+  return hit.triangle;
+}
+
+namespace {
+
+D4 half_of(const F8& x, int half) {
+  const int i = 4 * half;
+  return D4{x[i], x[i + 1], x[i + 2], x[i + 3]};
+}
+
+}  // namespace
+
+HitLanes TileLists::hits(I8 triangle, const Lanes3& direction) const {
+  HitLanes hit{triangle >> 1, splat(kInfinity), splat(0.0F), splat(0.0F)};  // -1 stays
+  I8 left = triangle >= 0;
+  for (int i = 0; i < kLanes; ++i) {
+    if (left[i] == 0) continue;
+    const I8 here = triangle == triangle[i];
+    const SightedTriangle t =
+        sighted(window_.triangles()[static_cast<std::size_t>(triangle[i])], {eye_.x(), eye_.y(), eye_.z()});
+    for (int half = 0; half < 2; ++half) {
+      const auto p = products(t, half_of(direction.x, half), half_of(direction.y, half), half_of(direction.z, half));
+      const D4 distance = t.height / p.along;
+      D4 u;
+      D4 v;
+      place_on_face(p, (triangle[i] & 1) != 0, u, v);
+      for (int k = 0; k < 4; ++k) {
+        const int lane = 4 * half + k;
+        if (here[lane] == 0) continue;
+        hit.distance[lane] = static_cast<float>(distance[k]);
+        hit.u[lane] = static_cast<float>(u[k]);
+        hit.v[lane] = static_cast<float>(v[k]);
+      }
+    }
+    left &= ~here;
+  }
+  return hit;
+}
+
 HitLanes TileLists::intersect(int row, std::array<int, 2> columns, const Lanes3& direction) const {
-  Nearest nearest{{I8{} - 1, splat(kInfinity), splat(0.0F), splat(0.0F)}, I8{}};
+  Nearest nearest{I8{} - 1, splat(kFarthest_m), splat(kFarthest_m), I8{}};
   search(row, columns[0], direction, nearest);
   if (columns[1] != columns[0]) search(row, columns[1], direction, nearest);
-  if (!any(nearest.doubtful)) {
-    nearest.hit.face >>= 1;  // -1 stays
-    return nearest.hit;
+  for (int i = 0; any(nearest.doubtful) && i < kLanes; ++i) {
+    if (nearest.doubtful[i] == 0) continue;
+    nearest.triangle[i] =
+        decide(row, columns[static_cast<std::size_t>(i / 4)], {direction.x[i], direction.y[i], direction.z[i]});
   }
-  const Lanes3 eye{splat(eye_.x()), splat(eye_.y()), splat(eye_.z())};
-  return window_.intersect({eye, direction});
+  return hits(nearest.triangle, direction);
 }
 
 }  // namespace roadfix

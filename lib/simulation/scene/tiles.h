@@ -2,8 +2,8 @@
 /// not hidden behind one that fills it. A ray then meets a handful of triangles instead of walking through a tree.
 ///
 /// The lists are conservative: whatever a ray of the tile would hit first is in its list, so the nearest hit in the
-/// list is the nearest of all. Where rounding decides (at a face's very edge, or between two faces in one plane),
-/// Embree is asked.
+/// list is the nearest of all. Floats find it in most lanes; where rounding could decide (at a face's very edge, or
+/// between two faces in one plane), doubles go through the list. Where on the face it lies is told by doubles always.
 #pragma once
 
 #include <vector>
@@ -72,6 +72,7 @@ class TileLists {
     TileGrid::Range columns, rows;
     std::uint32_t triangle;
     Float3 from_eye;
+    float length;  ///< of from_eye
   };
   struct Entry {
     float nearest;  ///< depth in this tile
@@ -81,12 +82,16 @@ class TileLists {
     std::vector<Entry> entries;
     std::vector<std::uint32_t> begin;  ///< of each tile's entries, and the end of the last
   };
-  /// The nearest hits so far, with triangles for faces, and the lanes in which rounding decides.
+  /// The nearest triangles so far with bounds of their distances, and the lanes in which rounding decides.
   struct Nearest {
-    HitLanes hit;
+    I8 triangle;
+    F8 near, far;
     I8 doubtful;
   };
   void search(int row, int column, const Lanes3& direction, Nearest& nearest) const;
+  /// The same in doubles, for one ray.
+  [[nodiscard]] int decide(int row, int column, const std::array<double, 3>& direction) const;
+  [[nodiscard]] HitLanes hits(I8 triangle, const Lanes3& direction) const;
   void look_at(std::uint32_t face, const std::array<Eigen::Vector3f, 4>& corner);
   void add_triangle(std::uint32_t triangle, const Eigen::Vector3f& a, const Eigen::Vector3f& b,
                     const Eigen::Vector3f& c);
@@ -94,6 +99,7 @@ class TileLists {
   const TileGrid& grid_;
   const RayWindow& window_;
   Eigen::Vector3f eye_;
+  float longest_;           ///< of the rays' directions
   std::vector<Seen> seen_;  ///< the nearest first
   std::vector<Row> rows_;
 };
