@@ -16,6 +16,10 @@ std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config, std::span
       return std::make_unique<DescriptorTracks>(config, make_sift(config));
     case FrontEndKind::kSuperPoint:
       return std::make_unique<DescriptorTracks>(config, make_superpoint(config, superpoint_weights));
+    case FrontEndKind::kXFeat:
+      return std::make_unique<DescriptorTracks>(config, make_xfeat(config, superpoint_weights));
+    case FrontEndKind::kAliked:
+      return std::make_unique<DescriptorTracks>(config, make_aliked(config, superpoint_weights));
     case FrontEndKind::kKlt:
       break;
   }

@@ -21,7 +21,7 @@ struct Feature {
   Eigen::Vector2f pixel;  ///< raw (distorted) image coordinates
 };
 
-enum class FrontEndKind { kKlt, kOrb, kSift, kSuperPoint };
+enum class FrontEndKind { kKlt, kOrb, kSift, kSuperPoint, kXFeat, kAliked };
 
 struct FrontEndConfig {
   FrontEndKind kind = FrontEndKind::kKlt;
@@ -38,7 +38,11 @@ struct FrontEndConfig {
   double match_radius_px = 60.0;        ///< around the predicted position
   double match_ratio = 0.85;            ///< ratio test: best over second best distance, upper limit
   double superpoint_min_score = 0.015;  ///< corner probability
-  double superpoint_scale = 0.5;        ///< image scale of the network's input
+  double xfeat_min_score = 0.05;        ///< as published
+  double xfeat_scale = 1.0;
+  double aliked_min_score = 0.2;  ///< as published
+  double aliked_scale = 1.0;
+  double superpoint_scale = 0.5;  ///< image scale of the network's input
 };
 
 template <class Visitor>
@@ -47,7 +51,9 @@ void visit(FrontEndConfig& c, Visitor& v) {
            {{"klt", FrontEndKind::kKlt},
             {"orb", FrontEndKind::kOrb},
             {"sift", FrontEndKind::kSift},
-            {"superpoint", FrontEndKind::kSuperPoint}});
+            {"superpoint", FrontEndKind::kSuperPoint},
+            {"xfeat", FrontEndKind::kXFeat},
+            {"aliked", FrontEndKind::kAliked}});
   v.integer("max_features", c.max_features, 50, 5000);
   v.number("min_distance_px", c.min_distance_px, 2.0, 100.0);
   v.integer("fast_threshold", c.fast_threshold, 1, 100);
@@ -61,6 +67,10 @@ void visit(FrontEndConfig& c, Visitor& v) {
   v.number("match_ratio", c.match_ratio, 0.1, 1.0);
   v.number("superpoint_min_score", c.superpoint_min_score, 1e-4, 1.0);
   v.number("superpoint_scale", c.superpoint_scale, 0.1, 1.0);
+  v.number("xfeat_min_score", c.xfeat_min_score, 1e-4, 1.0);
+  v.number("xfeat_scale", c.xfeat_scale, 0.1, 1.0);
+  v.number("aliked_min_score", c.aliked_min_score, 1e-4, 1.0);
+  v.number("aliked_scale", c.aliked_scale, 0.1, 1.0);
 }
 
 class FrontEnd {

@@ -8,6 +8,8 @@ TrackNoise track_noise(FrontEndKind kind) {
   switch (kind) {
     case FrontEndKind::kOrb:
     case FrontEndKind::kSuperPoint:
+    case FrontEndKind::kXFeat:  // not measured: the weights are the user's
+    case FrontEndKind::kAliked:
       return {0.5, 0.3, 0.7};
     case FrontEndKind::kKlt:
     case FrontEndKind::kSift:

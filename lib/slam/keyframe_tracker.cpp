@@ -32,6 +32,10 @@ double front_end_noise(const FrontEndConfig& front_end) {
       return 1.25;
     case FrontEndKind::kSuperPoint:
       return 1.25 / front_end.superpoint_scale;
+    case FrontEndKind::kXFeat:  // SuperPoint's, whose corner map it has; not measured: the weights are the user's
+      return 1.25 / front_end.xfeat_scale;
+    case FrontEndKind::kAliked:
+      return 1.25 / front_end.aliked_scale;
     case FrontEndKind::kKlt:
       break;
   }

@@ -34,8 +34,9 @@ std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoT
 std::unique_ptr<Stage> make_vo_tracker(const std::filesystem::path& vehicle_dir) {
   const auto config = load_config_or_defaults<VoTrackerConfig>(vehicle_dir / "vo_tracker.yaml");
   std::vector<uint8_t> weights;
-  if (!config.superpoint_model.empty()) {
-    const std::string bytes = read_text_file(vehicle_dir / config.superpoint_model, std::size_t{1} << 28U);
+  const std::string& model = config.network_model.empty() ? config.superpoint_model : config.network_model;
+  if (!model.empty()) {
+    const std::string bytes = read_text_file(vehicle_dir / model, std::size_t{1} << 28U);
     weights.assign(bytes.begin(), bytes.end());
   }
   return make_vo_tracker(load_calibration(vehicle_dir), config, weights);

@@ -36,10 +36,13 @@ void visit(MsckfVoConfig& c, Visitor& v) {
 /// configs/VEHICLE/vo_tracker.yaml.
 struct VoTrackerConfig {
   VoMode mode = VoMode::kAuto;
-  int threads = 2;               ///< 2: bundle adjustment in parallel with the tracking; the results are the same
-  bool filter_stamps = false;    ///< smooth the left camera's timestamps
-  double stereo_gap = 0.005;     ///< s, maximum stamp difference of a stereo pair
-  std::string superpoint_model;  ///< an ONNX file, relative to the configuration's folder; for front end superpoint
+  int threads = 2;             ///< 2: bundle adjustment in parallel with the tracking; the results are the same
+  bool filter_stamps = false;  ///< smooth the left camera's timestamps
+  double stereo_gap = 0.005;   ///< s, maximum stamp difference of a stereo pair
+  /// An ONNX file, relative to the configuration's folder: for front ends superpoint, xfeat and aliked (its inputs and
+  /// outputs: lib/features/keypoints.h).
+  std::string network_model;
+  std::string superpoint_model;  ///< the key of 0.1; network_model takes precedence
   KeyframeTrackerConfig keyframe;
   MsckfVoConfig msckf;
 };
@@ -50,6 +53,7 @@ void visit(VoTrackerConfig& c, Visitor& v) {
   v.integer("threads", c.threads, 1, 2);
   v.boolean("filter_stamps", c.filter_stamps);
   v.number("stereo_gap_s", c.stereo_gap, 0.0, 0.1);
+  v.text("network_model", c.network_model);
   v.text("superpoint_model", c.superpoint_model);
   v.group("keyframe", c.keyframe);
   v.group("msckf", c.msckf);

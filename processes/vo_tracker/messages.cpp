@@ -74,6 +74,10 @@ const char* name_of(FrontEndKind kind) {
       return "sift";
     case FrontEndKind::kSuperPoint:
       return "superpoint";
+    case FrontEndKind::kXFeat:
+      return "xfeat";
+    case FrontEndKind::kAliked:
+      return "aliked";
     case FrontEndKind::kKlt:
       break;
   }
