@@ -1,5 +1,5 @@
 /// What a machine needs before the bus works on it: each check says what it saw and, where something is wrong, the
-/// command that mends it.
+/// command that mends it (test/bus/mends.sh breaks each thing and runs what is said), or what a person has to decide.
 ///
 /// Checks read /proc and /sys below `root`, so that tests hand in a made tree; only the loop-back check opens a bus.
 #pragma once
@@ -15,9 +15,10 @@ enum class Level { kOk, kWarning, kError };
 
 struct Finding {
   Level level = Level::kOk;
-  std::string check;  ///< for example "multicast route"
-  std::string seen;   ///< what was found, in plain words
-  std::string mend;   ///< a shell command; empty where nothing needs mending
+  std::string check;        ///< for example "multicast route"
+  std::string seen;         ///< what was found, in plain words
+  std::string mend;         ///< a shell command for root, from the repository's folder; empty where none mends it
+  std::string advice = {};  ///< where no command can mend it: what to look at or to decide
 };
 
 /// What of an LCM URL matters here.
@@ -46,7 +47,8 @@ Finding check_ttl(const BusUrl& url);
 /// Sends one message to ourselves over `url`.
 Finding check_loopback(const std::string& url);
 
-/// Java, lcm-spy and the types jar, looked for in `path` (the value of PATH) and below `root`.
+/// Java with windows, lcm-spy with its libraries and the types' jar, looked for in `path` (the value of PATH) and below
+/// `root`.
 std::vector<Finding> check_spy(const std::string& path, const std::filesystem::path& root,
                                const std::filesystem::path& jar);
 

@@ -102,8 +102,8 @@ Finding check_route(const std::filesystem::path& root, const BusUrl& url) {
     return {Level::kWarning, "multicast route", fmt::format("through {}: works, at twice the latency of lo", best),
             add};
   if (url.ttl > 0 && best == "lo")
-    return {Level::kError, "multicast route", fmt::format("through lo, but ttl={} asks for other hosts", url.ttl),
-            "ip route replace 224.0.0.0/4 dev eth0   # the vehicle's network"};
+    return {Level::kError, "multicast route", fmt::format("through lo, but ttl={} asks for other hosts", url.ttl), "",
+            "ip route replace 224.0.0.0/4 dev INTERFACE, that of the vehicle's network (ip -brief link)"};
   return {Level::kOk, "multicast route", "through " + best, ""};
 }
 
@@ -132,7 +132,7 @@ Finding check_ttl(const BusUrl& url) {
   if (url.ttl == 0) return {Level::kOk, "ttl", "0: nothing leaves this machine", ""};
   return {Level::kWarning, "ttl",
           fmt::format("{}: every message goes out to the network, and anyone there can send", url.ttl),
-          fmt::format("export LCM_DEFAULT_URL='udpm://{}:{}?ttl=0'   # unless it is meant so", url.group, url.port)};
+          fmt::format("export LCM_DEFAULT_URL='udpm://{}:{}?ttl=0'", url.group, url.port), "unless it is meant so"};
 }
 
 Finding check_loopback(const std::string& url) {
@@ -153,8 +153,8 @@ Finding check_loopback(const std::string& url) {
   while (!receiver.received && std::chrono::steady_clock::now() - start < std::chrono::milliseconds(kLoopbackTimeoutMs))
     bus.handleTimeout(50);
   if (!receiver.received)
-    return {Level::kError, name, "a message to ourselves did not come back",
-            "ip route replace 224.0.0.0/4 dev lo   # and look for a firewall: nft list ruleset"};
+    return {Level::kError, name, "a message to ourselves did not come back", "",
+            "a firewall drops it? nft list ruleset shows who; let UDP to 224.0.0.0/4 pass"};
   return {Level::kOk, name, "a message to ourselves came back", ""};
 }
 

@@ -30,7 +30,7 @@ std::string contents(const std::filesystem::path& file) {
 
 Finding check_realtime(bool root, std::uint64_t priority_limit, std::uint64_t memory_limit) {
   const std::string mend =
-      "printf '* - rtprio 60\\n* - memlock unlimited\\n' >/etc/security/limits.d/roadfix.conf   # and log in again";
+      "printf '* - rtprio 60\\n* - memlock unlimited\\n' >/etc/security/limits.d/roadfix.conf   # then log in again";
   if (root) return {Level::kOk, "real time", "allowed to root", ""};
   if (priority_limit < kPriority)
     return {Level::kWarning, "real time",
@@ -81,7 +81,7 @@ std::vector<Finding> check_devices(const std::filesystem::path& root) {
     const std::string group = name.rfind("video", 0) == 0 ? "video" : "dialout";
     findings.push_back({ours ? Level::kOk : Level::kWarning, "device",
                         "/dev/" + name + (ours ? "" : " may not be opened"),
-                        ours ? "" : fmt::format("usermod -aG {} $USER   # and log in again", group)});
+                        ours ? "" : fmt::format("usermod -aG {} $USER   # then log in again", group)});
   }
   return findings;
 }
