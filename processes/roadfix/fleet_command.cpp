@@ -9,6 +9,7 @@
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "roadfix/evaluate/evaluate_log.h"
+#include "roadfix/fleet/compare.h"
 #include "roadfix/fleet/driver.h"
 #include "roadfix/fleet/run_task.h"
 
@@ -32,6 +33,12 @@ struct FolderOptions {
   EngineOptions engine;
   std::size_t failures = 20;
   std::vector<std::size_t> indices;
+};
+
+struct CompareArguments {
+  std::filesystem::path run_a;
+  std::filesystem::path run_b;
+  CompareOptions options;
 };
 
 std::vector<std::string> folders_matching(const std::string& pattern) {
@@ -96,6 +103,12 @@ void status(const FolderOptions& options) {
   if (const std::vector<std::string> jobs = unfinished_slurm_jobs(folder.path()); !jobs.empty())
     std::cout << fmt::format("Slurm has still to end job {}\n", fmt::join(jobs, ", "));
   finish(count(tasks, TaskState::kOk) == tasks.size() ? 0 : kFleetFailed);
+}
+
+void compare(const CompareArguments& arguments) {
+  const Comparison comparison = compare_runs(RunFolder(arguments.run_a), RunFolder(arguments.run_b), arguments.options);
+  std::cout << comparison_text(comparison, arguments.options);
+  finish(comparison.regressed() ? kNotGood : 0);
 }
 
 /// What an engine starts.
@@ -171,6 +184,27 @@ CLI::App* add_folder_command(CLI::App& fleet, const std::string& name, const std
   return command;
 }
 
+void add_compare_command(CLI::App& fleet) {
+  const auto arguments = std::make_shared<CompareArguments>();
+  CompareOptions& options = arguments->options;
+  CLI::App* command = fleet.add_subcommand("compare", "Two runs over the same drives: what got worse from A to B?");
+  command->add_option("run_a", arguments->run_a, "the run before")->required();
+  command->add_option("run_b", arguments->run_b, "the run after")->required();
+  add_channels(*command, options.channels, "What to compare; every channel of A where none is named");
+  command->add_option("--tolerance", options.tolerance, "share by which a figure of one drive may get worse")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command->add_option("--mean-tolerance", options.mean_tolerance, "and the mean over all drives, where that is certain")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command->add_option("--confidence", options.confidence, "of all intervals together")
+      ->check(CLI::Range(0.5, 0.999999))
+      ->capture_default_str();
+  command->add_option("--worst", options.worst, "so many drives are named")->capture_default_str();
+  command->footer("Exit status: 0 no regression; 1 a regression; 2 not done, standard error says why.");
+  command->callback([arguments] { compare(*arguments); });
+}
+
 }  // namespace
 
 void add_fleet_command(CLI::App& app) {
@@ -198,6 +232,7 @@ void add_fleet_command(CLI::App& app) {
   add_engine_options(*again, folder_options->engine);
   again->footer(kStatuses);
   again->callback([folder_options] { resume(*folder_options); });
+  add_compare_command(*fleet);
   CLI::App* task = add_folder_command(*fleet, "task", "Run tasks of a run by their index", *folder_options);
   task->group("");  // for engines, not for people
   task->add_option("indices", folder_options->indices, "from 0")->required();
