@@ -6,11 +6,13 @@
 #include <iostream>
 #include <memory>
 
+#include "config/config_error.h"
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "roadfix/evaluate/evaluate_log.h"
 #include "roadfix/fleet/compare.h"
 #include "roadfix/fleet/driver.h"
+#include "roadfix/fleet/report.h"
 #include "roadfix/fleet/run_task.h"
 
 namespace roadfix {
@@ -103,6 +105,15 @@ void status(const FolderOptions& options) {
   if (const std::vector<std::string> jobs = unfinished_slurm_jobs(folder.path()); !jobs.empty())
     std::cout << fmt::format("Slurm has still to end job {}\n", fmt::join(jobs, ", "));
   finish(count(tasks, TaskState::kOk) == tasks.size() ? 0 : kFleetFailed);
+}
+
+void report(const FolderOptions& options) {
+  const RunFolder folder(options.run);
+  const FleetPlan plan = folder.plan();
+  const FleetSummary summary = summarise_run(folder);
+  const std::filesystem::path page = folder.path() / "report.html";
+  write_text_file(page, fleet_page(folder, plan, summary));
+  std::cout << fleet_table(folder, summary) << page.string() << "\n";
 }
 
 void compare(const CompareArguments& arguments) {
@@ -232,6 +243,9 @@ void add_fleet_command(CLI::App& app) {
   add_engine_options(*again, folder_options->engine);
   again->footer(kStatuses);
   again->callback([folder_options] { resume(*folder_options); });
+  CLI::App* shown_page = add_folder_command(
+      *fleet, "report", "RUN/report.html, RUN/results.jsonl and a table of all drives", *folder_options);
+  shown_page->callback([folder_options] { report(*folder_options); });
   add_compare_command(*fleet);
   CLI::App* task = add_folder_command(*fleet, "task", "Run tasks of a run by their index", *folder_options);
   task->group("");  // for engines, not for people

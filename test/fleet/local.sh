@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # roadfix fleet on this machine: tasks that die, hang, are stopped; disks that are full; inputs, configurations and storage that change. Whatever happens
 # costs the task it happens to, is said in its result, and resume runs what is left and nothing else.
-#   local.sh ROADFIX troubles|interrupted|full|keyed|storage [DEMO_LOG DEMO_CONFIG]
+#   local.sh ROADFIX troubles|interrupted|full|keyed|storage|report [DEMO_LOG DEMO_CONFIG]
 set -euo pipefail
 roadfix=$1; what=$2
 if [[ $what == full && -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
@@ -139,6 +139,44 @@ storage)
   # Without a configuration the log's own calibration is used.
   "$roadfix" fleet run drives --root "$folder/b" --stages wheel_odometry,gnss_ins_ekf --out "$folder/own" >/dev/null 2>&1 || fail 'own calibration'
   no_scratch_left
+  ;;
+report)
+  # The page holds everything and fetches nothing; what is pooled is the sum of the drives; two runs of one build are no regression, a planted one is found.
+  drives=(tunnel_dark camera=none seeds=1..3)
+  flags=(--stages wheel_odometry,gnss_ins_ekf)
+  echo 'no log' >"$folder/bad.lcm"
+  "$roadfix" fleet run "${drives[@]}" "$folder/bad.lcm" "${flags[@]}" --out "$run" >/dev/null 2>&1 && fail 'a bad log ends well'
+  "$roadfix" fleet report "$run" >"$folder/out" || fail 'report'
+  [[ $(tail -1 "$folder/out") == "$run/report.html" && $(wc -l <"$run/results.jsonl") -eq 4 ]] || fail "$(cat "$folder/out")"
+  if grep -nE '<link|src=|@import|fetch\(|https?://' "$run/report.html" | grep -v www.w3.org; then fail 'the page fetches something'; fi
+  python3 - "$run" <<'CHECK' || fail 'the page does not hold what the drives say'
+import json, re, sys
+from pathlib import Path
+run = Path(sys.argv[1])
+page = (run / "report.html").read_text()
+data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.S).group(1))
+results = [json.loads(line) for line in (run / "results.jsonl").read_text().splitlines()]
+well = [r["figures"] for r in results if r["status"] == "ok"]
+assert len(well) == 3 and [t["status"] for t in data["tasks"]] == ["ok"] * 3 + ["failed"], data["tasks"]
+assert "bad.lcm" in data["tasks"][3]["reason"]
+for task in data["tasks"][:3]:
+    assert (run / task["page"]).is_file(), task
+for name, channel in data["channels"].items():
+    counts = [f["bounds"][name] for f in well]
+    assert channel["samples"] == sum(c["samples"] for c in counts) == sum(cell[2] for cell in channel["cells"]) > 1000
+    assert channel["exceeded"] == sum(c["exceeded"] for c in counts)
+    ends = [o["horizontal_m"] for f in well for o in f["channels"][name]["outages"]["each"]]
+    assert channel["outages_m"] == ends and len(ends) == 3, name
+CHECK
+  "$roadfix" fleet run "${drives[@]}" "${flags[@]}" --out "$folder/again" >/dev/null || fail 'again'
+  rm "$(result "$run" 3)"
+  "$roadfix" fleet compare "$run" "$folder/again" --tolerance 0 --mean-tolerance 0 >"$folder/out" || fail "$(cat "$folder/out")"
+  grep -q '3 drives in both, 3 with the same bits; 1 only in A' "$folder/out" || fail "$(cat "$folder/out")"
+  "$roadfix" fleet run tunnel_dark camera=none seeds=1..2 tunnel_dark camera=none seed=3 fault=gnss.bias@20+30:east_m=3 "${flags[@]}" --out "$folder/planted" >/dev/null || fail 'planted'
+  sed -i 's/ fault=gnss.bias@20+30:east_m=3"/"/' "$folder/planted/tasks.jsonl"
+  status=0; "$roadfix" fleet compare "$folder/again" "$folder/planted" >"$folder/out" || status=$?
+  [[ $status -eq 1 ]] || fail "a planted regression: status $status"
+  grep -q '^ .*tunnel_dark camera=none seed=3$' "$folder/out" && grep -q 'REGRESSION: 1 drives' "$folder/out" || fail "$(cat "$folder/out")"
   ;;
 esac
 echo "$what: as wanted"

@@ -1,10 +1,22 @@
-/// The parts of the report page, embedded from page.html, page.css and page.js.
+/// The parts of the report page, embedded from page.html, page.css and page.js, and what all report pages draw with.
 #pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
 
 namespace roadfix {
 
 extern const char* const kPageHtml;
 extern const char* const kPageCss;
 extern const char* const kPageJs;
+extern const char* const kDrawJs;
+
+/// Puts a value in place of @KEY@.
+void replace_all(std::string& text, std::string_view key, const std::string& value);
+/// As text of a page.
+std::string html_safe(const std::string& text);
+/// As the text of a script element.
+std::string script_safe(const nlohmann::ordered_json& json);
 
 }  // namespace roadfix

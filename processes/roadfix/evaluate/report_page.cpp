@@ -137,6 +137,8 @@ Json plots_json(const EvaluationReport& report) {
           {"channels", channels}};
 }
 
+}  // namespace
+
 void replace_all(std::string& text, std::string_view key, const std::string& value) {
   for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + value.size())) {
     text.replace(at, key.size(), value);
@@ -144,7 +146,8 @@ void replace_all(std::string& text, std::string_view key, const std::string& val
 }
 
 /// JSON inside a script element: only "</" could end it early.
-std::string script_safe(std::string json) {
+std::string script_safe(const nlohmann::ordered_json& value) {
+  std::string json = value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   for (std::size_t at = json.find("</"); at != std::string::npos; at = json.find("</", at + 3))
     json.insert(at + 1, "\\");
   return json;
@@ -164,19 +167,15 @@ std::string html_safe(const std::string& text) {
   return out;
 }
 
-}  // namespace
-
 std::string report_page(const EvaluationReport& report) {
   std::string page = kPageHtml;
   const std::string name = report.facts.name.empty() ? "drive" : report.facts.name;
   replace_all(page, "@TITLE@", html_safe(name));
   replace_all(page, "@CSS@", kPageCss);
   replace_all(page, "@TABLE@", html_safe(report_table(report)));
-  replace_all(page, "@JS@", kPageJs);
-  replace_all(page, "@PLOTS@",
-              script_safe(plots_json(report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)));
-  replace_all(page, "@FIGURES@",
-              script_safe(report_json(report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)));
+  replace_all(page, "@JS@", std::string(kDrawJs) + kPageJs);
+  replace_all(page, "@PLOTS@", script_safe(plots_json(report)));
+  replace_all(page, "@FIGURES@", script_safe(report_json(report)));
   return page;
 }
 
