@@ -5,7 +5,7 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 
 # -pthread everywhere, because LCM asks for it and a precompiled header must match.
-# -ffp-contract=off and one explicit -march: two builds of one source give the same bits (DESIGN.md, section 5).
+# -ffp-contract=off and one explicit -march: two builds of one source give the same bits (docs/DESIGN.md, section 5).
 add_library(roadfix_options INTERFACE)
 target_compile_options(roadfix_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow -ffp-contract=off -pthread)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")

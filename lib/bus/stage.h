@@ -1,5 +1,5 @@
 /// What a process is to the bus: a handler of checked, ordered messages. The same stage runs live, in replay and under
-/// verify, and cannot tell which (DESIGN.md, section 4).
+/// verify, and cannot tell which (docs/DESIGN.md, section 4).
 ///
 /// For each accepted clock sample of time T the runner calls, in this order:
 ///   on_clock(sample)     at arrival, ahead of the horizon;

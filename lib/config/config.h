@@ -1,6 +1,7 @@
 /// Strict YAML configuration, both ways. A struct with in-class defaults says its keys once, in a visit() found by
 /// argument-dependent lookup; units are part of the keys, and the library that owns the struct needs no YAML:
 ///
+/// ```
 ///   template <class Visitor>
 ///   void visit(WheelConfig& c, Visitor& v) {
 ///     v.number("gyro_noise_radps_per_rthz", c.gyro_noise, 1e-7, 1.0);       // key, value, min, max
@@ -18,6 +19,7 @@
 ///     v.require("name");                                                    // all other keys are optional
 ///     v.check("q_wxyz", is_unit(c.q), "must have unit norm");               // conditions that are not a range
 ///   }
+/// ```
 ///
 /// Reading refuses, with file, line, key path, value and allowed range (ConfigError): an unknown key (naming the one
 /// that was probably meant, a wrong unit suffix first), a missing required key, a wrong type, NaN, a value out of

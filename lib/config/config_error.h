@@ -7,7 +7,7 @@
 
 namespace roadfix {
 
-/// Thrown at start-up only; main() prints it and exits 2 (STYLE.md, section 5).
+/// Thrown at start-up only; main() prints it and exits 2 (docs/STYLE.md, section 5).
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

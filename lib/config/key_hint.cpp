@@ -8,7 +8,7 @@
 namespace roadfix {
 namespace {
 
-/// Units that a key may end in (STYLE.md, section 2), and those that users reach for instead.
+/// Units that a key may end in (docs/STYLE.md, section 2), and those that users reach for instead.
 constexpr std::array<std::string_view, 35> kUnits = {
     "m",   "mm",   "cm",  "km",    "mps",   "kmph", "kmh",   "kph",    "mph",   "mps2", "g",   "mg",
     "rad", "mrad", "deg", "radps", "degps", "dps",  "degph", "radps2", "s",     "ms",   "us",  "ns",

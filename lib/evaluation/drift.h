@@ -10,10 +10,10 @@ namespace roadfix {
 
 /// ATE as `evo_ape` computes it: root mean square of the position errors' norms.
 double ate_rmse(const std::vector<PoseError>& errors);
-/// ATE of paper C, (9): mean of the position errors' norms.
+/// ATE of Lee et al. (2025), (9): mean of the position errors' norms.
 double ate_mean(const std::vector<PoseError>& errors);
 
-/// RPE of paper C, (10): mean norm of the difference between the displacements over `stride` samples, both in the
+/// RPE of Lee et al. (2025), (10): mean norm of the difference between the displacements over `stride` samples, both in the
 /// common frame; translation only. Nothing with fewer than stride + 1 pairs.
 std::optional<double> rpe_mean(const std::vector<PosePair>& pairs, int stride = 100);
 

@@ -46,13 +46,13 @@ struct EvaluationOptions {
   bool fit_delay = false;              ///< the reference's constant latency is fitted first, within +-2 s
   double turn_threshold = 3.0 * 3.14159265358979323846 / 180.0;  ///< rad/s, of MPA
   double usable_within = kUsableWithin;                          ///< m, horizontally
-  int rpe_stride = 100;                                          ///< samples, paper C
+  int rpe_stride = 100;                                          ///< samples, Lee et al. (2025)
 };
 
 struct AlignedAte {
   Alignment alignment = Alignment::kNone;
   double rmse = 0.0;             ///< m, as evo
-  double mean = 0.0;             ///< m, as paper C
+  double mean = 0.0;             ///< m, as Lee et al. (2025)
   double horizontal_rmse = 0.0;  ///< m
   double scale = 1.0;
 };
@@ -79,7 +79,7 @@ struct ChannelScore {
   double ate_rmse = 0.0;
   double ate_mean = 0.0;
   std::vector<AlignedAte> ate_by_alignment;
-  std::optional<double> rpe_mean;         ///< m, paper C
+  std::optional<double> rpe_mean;         ///< m, Lee et al. (2025)
   std::optional<RelativeError> rpe_rmse;  ///< evo, over the samples of about one second
   std::optional<KittiDrift> kitti;
   OutageErrors outages;

@@ -1,4 +1,4 @@
-/// Does the fusion's likelier motion model match what the car does? Paper C, (13), and the two figures without which it
+/// Does the fusion's likelier motion model match what the car does? Lee et al. (2025), (13), and the two figures without which it
 /// misleads: always answering "no turn" scores high on any drive, so a balanced rate stands beside it.
 #pragma once
 

@@ -8,7 +8,7 @@
 namespace roadfix {
 namespace {
 
-/// Paper C, section 4.3.2: "1.1 times the mean ATE".
+/// Lee et al. (2025), section 4.3.2: "1.1 times the mean ATE".
 constexpr double kReconvergenceFactor = 1.1;
 /// Below this path an outage is standing still and an error in percent of it says nothing.
 constexpr double kStandstill_m = 1.0;

@@ -1,4 +1,4 @@
-/// Figures about GNSS outages: errors at their ends, and paper C's TSE and RCT.
+/// Figures about GNSS outages: errors at their ends, and Lee et al.'s (2025) TSE and RCT.
 #pragma once
 
 #include <optional>
@@ -40,7 +40,7 @@ struct OutageErrors {
 OutageErrors outage_errors(const Trajectory& estimate, const Trajectory& reference, const std::vector<Outage>& outages,
                            const std::vector<PoseError>& errors, const ReferenceKind& kind);
 
-/// TSE of paper C, (11): mean over the transitions of the largest error within half_width_s of each loss and each
+/// TSE of Lee et al. (2025), (11): mean over the transitions of the largest error within half_width_s of each loss and each
 /// return. Nothing without a transition among the errors.
 std::optional<double> transition_stability(const std::vector<PoseError>& errors, const std::vector<Outage>& outages,
                                            double half_width_s = kTransition);
@@ -52,7 +52,7 @@ struct Reconvergence {
   int never = 0;  ///< returns after which the error stays above until the next loss or the end; not in the mean
 };
 
-/// RCT of paper C, (12): time from each return until the error is below 1.1 times the mean ATE.
+/// RCT of Lee et al. (2025), (12): time from each return until the error is below 1.1 times the mean ATE.
 std::optional<Reconvergence> reconvergence(const std::vector<PoseError>& errors, const std::vector<Outage>& outages);
 
 }  // namespace roadfix

@@ -1,7 +1,7 @@
 /// Interface of all front ends: track image points from image to image under unique track numbers.
 ///
 /// Estimators see only tracks, so that optical flow and descriptor matching are interchangeable. The same images,
-/// predictions and calls give the same tracks, bit for bit (DESIGN.md, section 5, names the machines).
+/// predictions and calls give the same tracks, bit for bit (docs/DESIGN.md, section 5, names the machines).
 #pragma once
 
 #include <Eigen/Dense>

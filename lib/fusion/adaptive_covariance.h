@@ -1,4 +1,4 @@
-/// Paper C, section 3.2.2: what a channel's covariance is multiplied with and clipped to, and how that changes when
+/// Lee et al. (2025), section 3.2.2: what a channel's covariance is multiplied with and clipped to, and how that changes when
 /// GNSS goes and comes back. Kept as printed; the default scheme (relative motion and gained information) needs none of
 /// it.
 #pragma once

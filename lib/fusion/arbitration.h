@@ -1,4 +1,4 @@
-/// Paper B, section 3.2: do the camera and the wheels agree? As printed, (14) and (15), and as a normalised test on
+/// Ock et al. (2020), section 3.2: do the camera and the wheels agree? As printed, (14) and (15), and as a normalised test on
 /// relative motion with hysteresis (MODEL.md, section 7).
 #pragma once
 
@@ -8,13 +8,13 @@
 
 namespace roadfix {
 
-/// x, y and the three angles: what paper B compares.
+/// x, y and the three angles: what Ock et al. (2020) compares.
 struct PaperPose {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< m
   YawPitchRoll angles;
 };
 
-/// O_diff, paper B (14), with the division by three that is printed and has no reason. Zero whenever position alone or
+/// O_diff, Ock et al. (2020), (14), with the division by three that is printed and has no reason. Zero whenever position alone or
 /// attitude alone differs.
 double printed_difference(const PaperPose& wheels, const PaperPose& visual);
 
@@ -22,7 +22,7 @@ struct Arbitrated {
   PaperPose pose;
   bool visual_used = true;
 };
-/// Paper B (15): the mean of both up to the threshold, the wheels beyond it. Angles are averaged on the circle.
+/// Ock et al. (2020), (15): the mean of both up to the threshold, the wheels beyond it. Angles are averaged on the circle.
 Arbitrated printed_arbitration(const PaperPose& wheels, const PaperPose& visual, double threshold);
 
 struct AgreementConfig {

@@ -1,4 +1,4 @@
-/// One pose from GNSS/INS, vision and wheels: an IMM of two motion models (paper C), fed by relative motion and by what
+/// One pose from GNSS/INS, vision and wheels: an IMM of two motion models (Lee et al., 2025), fed by relative motion and by what
 /// absolute poses gained. Derivation: lib/fusion/MODEL.md.
 ///
 /// Frames: enu for POSE_INS and POSE_FUSED; vo and wheel are the estimators' own level frames; local starts where the

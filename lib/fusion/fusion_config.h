@@ -9,7 +9,7 @@
 
 namespace roadfix {
 
-/// kLiteral: paper C, each pose an independent absolute measurement. kRelative: motion since the last use, and of
+/// kLiteral: Lee et al. (2025), each pose an independent absolute measurement. kRelative: motion since the last use, and of
 /// absolute poses only what they gained (MODEL.md, section 4).
 enum class FusionScheme { kRelative, kLiteral };
 

@@ -35,7 +35,7 @@ void Fusion::update_tie(const ChannelSample& s) {
   last_tie_us_ = t_us_;
 }
 
-/// Paper B: vision starts again at the pose that the others agree on. Needs the tie, and somebody else who is alive.
+/// Ock et al. (2020): vision starts again at the pose that the others agree on. Needs the tie, and somebody else who is alive.
 void Fusion::ask_restart(const char* reason) {
   const bool others = alive(FusionChannel::kIns) || alive(FusionChannel::kWheel);
   const bool lately = restart_us_ && seconds_between(*restart_us_, t_us_) < config_.restart_every;

@@ -1,6 +1,6 @@
 /// The steps of an interacting multiple model filter, one free function each (Blom, Bar-Shalom, The interacting
 /// multiple model algorithm, 1988; Bar-Shalom, Li, Kirubarajan, Estimation with applications to tracking and
-/// navigation, 2001, section 11.6.6; paper C, section 3.2 and (7), (8)). Angles are mixed as angles; likelihoods stay
+/// navigation, 2001, section 11.6.6; Lee et al. (2025), section 3.2 and (7), (8)). Angles are mixed as angles; likelihoods stay
 /// logarithms.
 ///
 /// In order: mix, predict, any number of updates (each adds to log_likelihood), reweigh, combine.
@@ -41,7 +41,7 @@ void predict(Imm& imm, const MotionNoise& noise, double dt, PosesBefore* before 
 /// Probabilities by the likelihoods: log-sum-exp, so that they sum to one for likelihoods as small as they come.
 void reweigh(Imm& imm);
 
-/// Moments of the mixture, paper C (7), (8).
+/// Moments of the mixture, Lee et al. (2025), (7), (8).
 void combine(const Imm& imm, FusionEstimate& combined);
 inline FusionEstimate combine(const Imm& imm) {
   FusionEstimate combined;

@@ -32,10 +32,10 @@ struct ChannelSlots {
   std::optional<int> velocity;  ///< east and north: a lasting error of the motion
 };
 
-/// Paper C (5), (6): the pose as a pseudo-measurement of position and yaw.
+/// Lee et al. (2025), (5), (6): the pose as a pseudo-measurement of position and yaw.
 FusionMeasurement<3> absolute_pose(const fusion::Vector& x, const Planar& pose, const Eigen::Matrix3d& R);
 
-/// Paper C (5), (6) of one component.
+/// Lee et al. (2025), (5), (6) of one component.
 FusionMeasurement<1> absolute_component(const fusion::Vector& x, int index, double value, double sigma);
 
 /// A yaw rate, with its standard deviation.

@@ -1,4 +1,4 @@
-/// The two motion models of paper C, constant acceleration (CA) and constant turn (CT); MODEL.md, section 3.
+/// The two motion models of Lee et al. (2025), constant acceleration (CA) and constant turn (CT); MODEL.md, section 3.
 ///
 /// Both let the speed change with the acceleration; they differ in the turn: CA drives straight on and draws a small
 /// yaw rate anew at each step, CT keeps its yaw rate and lets it wander.

@@ -1,4 +1,4 @@
-/// What makes Eigen give the same bits on every machine of one kind (DESIGN.md, section 5).
+/// What makes Eigen give the same bits on every machine of one kind (docs/DESIGN.md, section 5).
 #pragma once
 
 namespace roadfix {

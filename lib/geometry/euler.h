@@ -12,7 +12,7 @@ struct YawPitchRoll {
   double roll = 0.0;   ///< rad, (-pi, pi]
 };
 
-/// Angles of R; at the gimbal lock (|pitch| = 90 deg) roll is set to zero and yaw takes both, after paper B (12), (13).
+/// Angles of R; at the gimbal lock (|pitch| = 90 deg) roll is set to zero and yaw takes both, after Ock et al. (2020), (12), (13).
 YawPitchRoll yaw_pitch_roll(const Eigen::Matrix3d& R);
 YawPitchRoll yaw_pitch_roll(const Eigen::Quaterniond& q);
 

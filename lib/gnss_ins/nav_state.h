@@ -2,7 +2,7 @@
 ///
 /// Frames: enu is fixed to the Earth at the anchor; imu axes x forward, y left, z up; vehicle axes differ from the
 /// imu's by the mounting angles. Error: x = x_hat + dx, and for the attitude R_enu_imu = Exp(phi) R_hat with phi in
-/// *enu* axes. STYLE.md's example has the error in imu axes; here the transition matrix becomes a plain sum over the
+/// *enu* axes. Many texts have the error in imu axes; here the transition matrix becomes a plain sum over the
 /// IMU samples (M.12), and outputs are converted (M.40).
 #pragma once
 

@@ -20,7 +20,7 @@ struct ChannelLimits {
   double slow_share = 0.7;       ///< of the expected rate
   double fast_factor = 2.0;      ///< of the configured rate
   double lost_share = 0.05;      ///< of the messages of one second
-  double latency = 0.25;         ///< s after the stamp; no shipped stage waits longer (DESIGN.md, section 4)
+  double latency = 0.25;         ///< s after the stamp; no shipped stage waits longer (docs/DESIGN.md, section 4)
   double ahead = 0.1;            ///< s before the stamp
   double stamp_jump = 0.5;       ///< s between what the stamps say and what the clock says
   double frozen_after = 0.5;     ///< s with one and the same content, and at least frozen_messages of them

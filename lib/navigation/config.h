@@ -44,7 +44,7 @@ struct ClockPriors {
   }
 };
 
-/// Which sources are used. The same library is paper C's EKF without camera or its MSCKF without GNSS by this list.
+/// Which sources are used. The same library is Lee et al.'s (2025) EKF without camera or its MSCKF without GNSS by this list.
 struct SourceList {
   bool gnss_position = true;
   bool gnss_velocity = true;

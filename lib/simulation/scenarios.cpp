@@ -30,7 +30,7 @@ void add_faults(ScenarioConfig& c, std::initializer_list<const char*> texts) {
 
 void set_scene(ScenarioConfig& c, std::vector<SceneSegment> segments) { c.scene.segments = std::move(segments); }
 
-/// The course of paper C: a minute of open sky, half a minute of bad fixes under a bridge, a minute of tunnel, and
+/// The course of Lee et al. (2025): a minute of open sky, half a minute of bad fixes under a bridge, a minute of tunnel, and
 /// fixes that are off when they come back.
 void set_tunnel(ScenarioConfig& c, StreetKind tunnel) {
   c.motion.route = RouteKind::kTunnel;

@@ -10,7 +10,7 @@
 namespace roadfix {
 namespace {
 
-/// Age of the information behind a restart request (DESIGN.md, section 4: the largest lateness).
+/// Age of the information behind a restart request (docs/DESIGN.md, section 4: the largest lateness).
 constexpr int64_t kRestartLatency_us = 250'000;
 constexpr double kMinScaleWay = 3.0;  ///< m, distance required before speeds set the scale of a map
 

@@ -1,5 +1,5 @@
 /// Puts a stage's inputs in order: takes them as they arrive, gives them back when the horizon has reached them, and
-/// keeps the ledger of those that were not taken (DESIGN.md, section 4).
+/// keeps the ledger of those that were not taken (docs/DESIGN.md, section 4).
 ///
 /// horizon = clock - lateness: the largest of the channels, or less where allow_lateness() says so. An input is applied
 /// once utime + effect delay <= horizon, in the order (utime + effect delay, rank, run, seq); one that arrives when the

@@ -1,4 +1,4 @@
-/// The exceptions to "every input was applied" (DESIGN.md, section 4). Inputs without an entry were taken.
+/// The exceptions to "every input was applied" (docs/DESIGN.md, section 4). Inputs without an entry were taken.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-/// configs/<vehicle>/pose_server.yaml: which pose goes out, as what, where to and how often.
+/// configs/VEHICLE/pose_server.yaml: which pose goes out, as what, where to and how often.
 #pragma once
 
 #include <Eigen/Dense>

@@ -25,7 +25,7 @@ namespace {
 enum Output { kPose = 0, kStatus = 1, kFeatures = 2 };
 constexpr int kImu = 0, kLeft = 1, kRight = 2;
 
-constexpr int64_t kFeedback_us = 500'000;        // DESIGN.md, section 4
+constexpr int64_t kFeedback_us = 500'000;        // docs/DESIGN.md, section 4
 constexpr int64_t kWheelLateness_us = 50'000;    // as there
 constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
 constexpr int64_t kImuTimeout_us = 200'000;

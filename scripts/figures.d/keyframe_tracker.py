@@ -1,6 +1,6 @@
 """keyframe_tracker: the keyframe tracker on KITTI 00, on Malaga and on simulated tracks.
 
-Run by itself it prints every front end on KITTI 00 (paper A's figures 5 to 7 and its table 1 for this clip):
+Run by itself it prints every front end on KITTI 00 (Kim and Kang's (2025) figures 5 to 7 and its table 1 for this clip):
   python3 scripts/figures.d/keyframe_tracker.py
 CPU is the process's, all threads, keyframes and bundle adjustment included; decoding the pictures is measured apart.
 """

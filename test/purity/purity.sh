@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Greps ROOT for what DESIGN.md (sections 3 and 5) and STYLE.md (sections 4 and 8) forbid; prints each breach and fails with their number.
+# Greps ROOT for what docs/DESIGN.md (sections 3 and 5) and docs/STYLE.md (sections 4 and 8) forbid; prints each breach and fails with their number.
 #   purity.sh ROOT
 set -uo pipefail
 cd "$1" || exit 2

@@ -19,7 +19,7 @@ class ProcessLoad {
 
 int64_t resident_bytes();
 
-/// What decides whether two processes compute the same bits (DESIGN.md, section 5).
+/// What decides whether two processes compute the same bits (docs/DESIGN.md, section 5).
 std::string build_id();          ///< of the sources and flags that this program was built from
 std::string library_versions();  ///< of what computes: the C library, Eigen
 std::string cpu_features();      ///< what the C library and others dispatch on

@@ -1,5 +1,5 @@
 /// Proves what a drive computed: runs every stage again from the recorded inputs and compares its outputs, byte for
-/// byte, with those that were published in the car (DESIGN.md, sections 1 and 4).
+/// byte, with those that were published in the car (docs/DESIGN.md, sections 1 and 4).
 #pragma once
 
 #include <filesystem>

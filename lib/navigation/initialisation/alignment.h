@@ -34,7 +34,15 @@ class Alignment {
   void forget_place();
 
   template <class Archive>
-  void serialise(Archive& a, const std::optional<Geodetic>& anchor);
+  void serialise(Archive& a, const std::optional<Geodetic>& anchor) {
+    hypotheses_.serialise(a, anchor ? inertial::Earth(*anchor) : inertial::Earth());
+    for (std::optional<GnssFix>* fix : {&fix_, &fix_before_})
+      serialise_optional(
+          a, *fix, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });
+    serialise_optional(
+        a, memory_, [] { return Memory(); }, [&](Memory& m) { m.serialise(a); });
+    a(first_us_, parked_);
+  }
 
  private:
   NavigationConfig config_;
@@ -44,16 +52,5 @@ class Alignment {
   int64_t first_us_ = 0;
   bool parked_ = false;
 };
-
-template <class Archive>
-void Alignment::serialise(Archive& a, const std::optional<Geodetic>& anchor) {
-  hypotheses_.serialise(a, anchor ? inertial::Earth(*anchor) : inertial::Earth());
-  for (std::optional<GnssFix>* fix : {&fix_, &fix_before_})
-    serialise_optional(
-        a, *fix, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });
-  serialise_optional(
-      a, memory_, [] { return Memory(); }, [&](Memory& m) { m.serialise(a); });
-  a(first_us_, parked_);
-}
 
 }  // namespace roadfix::navigation

@@ -1,4 +1,4 @@
-/// A device's own clock on the time line of the computer's utime (DESIGN.md, section 4).
+/// A device's own clock on the time line of the computer's utime (docs/DESIGN.md, section 4).
 ///
 /// utime = device time + offset. Reading comes some delay after the device's stamp, so (read utime - device time) is
 /// the offset plus that delay, and its smallest values show the offset. The estimate is a running minimum that creeps

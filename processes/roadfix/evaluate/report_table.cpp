@@ -57,13 +57,13 @@ std::string honesty_rows(const Honesty& h) {
 
 std::string trajectory_lines(const ChannelScore& c) {
   std::string text =
-      fmt::format("  ATE {} m RMSE (evo), {} m mean norm (paper C)", number(c.ate_rmse), number(c.ate_mean));
+      fmt::format("  ATE {} m RMSE (evo), {} m mean norm (Lee et al., 2025)", number(c.ate_rmse), number(c.ate_mean));
   text += fmt::format("; after alignment, RMSE:");
   for (const AlignedAte& a : c.ate_by_alignment) {
     if (a.alignment != Alignment::kNone) text += fmt::format(" {} {}", name_of(a.alignment), number(a.rmse));
   }
   text += "\n";
-  if (c.rpe_mean) text += fmt::format("  RPE {} m mean over 100 samples (paper C)\n", number(*c.rpe_mean));
+  if (c.rpe_mean) text += fmt::format("  RPE {} m mean over 100 samples (Lee et al., 2025)\n", number(*c.rpe_mean));
   if (c.rpe_rmse) {
     text += fmt::format("  RPE {} m, {} deg RMSE over {} samples (evo)\n", number(c.rpe_rmse->translation_rmse),
                         number(c.rpe_rmse->rotation_rmse / kDegree), c.rpe_rmse->delta);
@@ -90,7 +90,7 @@ std::string outage_lines(const ChannelScore& c) {
                         number(c.rct->threshold_m));
     if (c.rct->never > 0) text += fmt::format(" ({} of {} returns never)", c.rct->never, c.rct->returns);
   }
-  if (c.tse_m || c.rct) text += " (paper C)\n";
+  if (c.tse_m || c.rct) text += " (Lee et al., 2025)\n";
   if (c.modes) {
     text += fmt::format("  MPA {:.1f} % (balanced {:.1f} %, always CA {:.1f} %) at {:.1f} deg/s\n", c.modes->percent,
                         c.modes->balanced_percent, c.modes->always_straight_percent, c.modes->threshold / kDegree);
@@ -147,10 +147,10 @@ std::string aligned_mean(const ChannelScore& c, Alignment alignment) {
   return "-";
 }
 
-/// Tables 1 and 2 of paper C for this drive. Its VIO was aligned to the reference by a similarity before it was scored;
+/// Tables 1 and 2 of Lee et al. (2025) for this drive. Its VIO was aligned to the reference by a similarity before it was scored;
 /// a car has no reference, so that what was published stands first, and the paper's way beside it by its name.
 std::string paper_tables(const EvaluationReport& report) {
-  std::string text = fmt::format("\n{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", "paper C", "ATE mean m",
+  std::string text = fmt::format("\n{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", "Lee 2025", "ATE mean m",
                                  "ATE sim3 m", "RPE m", "TSE m", "RCT s", "MPA %", "balanced %", "always CA %");
   for (const ChannelScore& c : report.channels) {
     const auto share = [](double value) { return fmt::format("{:.1f}", value); };

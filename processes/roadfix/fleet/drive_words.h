@@ -6,7 +6,7 @@
 ///   tunnel_lit seeds=1..200 fault=none fault=gnss.bias@30+5:east_m=15/wheels.slip@40+2
 ///                                              a scenario, one drive a seed and fault; "/" joins faults of one drive
 ///   recordings                                 a folder of logs: each of them
-///   @drives.txt                                a file with such words, one group a line, # before remarks
+///   `@drives.txt`                              a file with such words, one group a line, # before remarks
 ///
 /// KEY=VALUE changes the drive that stands before it.
 #pragma once

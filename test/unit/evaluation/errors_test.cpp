@@ -112,7 +112,7 @@ TEST_CASE("on a straight road the drift of a scale error is exact") {
   CHECK_FALSE(rpe_mean(pairs, 5000));
 }
 
-TEST_CASE("a global turn shows in paper C's RPE and not in evo's") {
+TEST_CASE("a global turn shows in Lee et al.'s RPE and not in evo's") {
   const SE3 turn{exp_q({0, 0, 0.1}), Eigen::Vector3d::Zero()};
   const auto pairs =
       against(changed(kReference, [&](Odometry& pose) { pose.T_frame_vehicle = turn * pose.T_frame_vehicle; }));

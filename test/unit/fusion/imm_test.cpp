@@ -105,7 +105,7 @@ TEST_CASE("yaws are mixed as angles") {
   imm.modes[1].estimate.x(kYaw) = -kPi + 0.1;
   for (Mode& mode : imm.modes) mode.estimate.P.setIdentity();
   CHECK(std::abs(wrap_angle(combine(imm).x(kYaw) - kPi)) < 1e-12);
-  CHECK(combine(imm).P(kYaw, kYaw) == Approx(1.0 + 0.01));  // paper C (8): spread of the means
+  CHECK(combine(imm).P(kYaw, kYaw) == Approx(1.0 + 0.01));  // Lee et al. (2025), (8): spread of the means
   mix(imm, mode_transition(1.0, {1.0, 1.0}));
   CHECK(std::abs(wrap_angle(imm.modes[0].estimate.x(kYaw) - kPi)) < 0.1);
 }

@@ -13,7 +13,7 @@ namespace {
 
 using test::Draws;
 
-TEST_CASE("paper A taken literally is the identity") {
+TEST_CASE("Kim and Kang taken literally is the identity") {
   Draws draws(1);
   LiteralTrajectoryEkf ekf({});
   Eigen::Vector2d p = Eigen::Vector2d::Zero();
@@ -25,7 +25,7 @@ TEST_CASE("paper A taken literally is the identity") {
   }
 }
 
-TEST_CASE("any start offset of paper A's filter decays to the odometry's path") {
+TEST_CASE("any start offset of Kim and Kang's filter decays to the odometry's path") {
   Draws draws(2);
   LiteralTrajectoryEkf ekf({});
   Eigen::Vector2d p = Eigen::Vector2d::Zero();
@@ -41,7 +41,7 @@ TEST_CASE("any start offset of paper A's filter decays to the odometry's path") 
   CHECK(last < 1e-6);
 }
 
-TEST_CASE("paper A's covariance trace settles at the steady state of its Riccati equation") {
+TEST_CASE("Kim and Kang's covariance trace settles at the steady state of its Riccati equation") {
   const LiteralTrajectoryConfig c{0.5, 1.0};
   LiteralTrajectoryEkf ekf(c);
   for (int i = 0; i < 100; ++i) ekf.add(Eigen::Vector2d(i, 0.0));
@@ -77,7 +77,7 @@ TEST_CASE("a motion model takes away what is noise") {
 
 PaperPose pose(double x, double y, double yaw) { return {{x, y}, {yaw, 0.0, 0.0}}; }
 
-TEST_CASE("paper B's product is blind to a pure jump of the position") {
+TEST_CASE("Ock et al.'s product is blind to a pure jump of the position") {
   CHECK(printed_difference(pose(0.0, 0.0, 0.3), pose(100.0, 0.0, 0.3)) == 0.0);
   CHECK(printed_difference(pose(0.0, 0.0, 0.0), pose(0.0, 0.0, 1.0)) == 0.0);
   CHECK(printed_difference(pose(0.0, 0.0, 0.0), pose(3.0, 4.0, 0.6)) ==
@@ -89,7 +89,7 @@ TEST_CASE("paper B's product is blind to a pure jump of the position") {
   CHECK(squared_distance(wheels, visual) == Approx(0.04 / 2e-4));
 }
 
-TEST_CASE("paper B's mean and fall-back") {
+TEST_CASE("Ock et al.'s mean and fall-back") {
   const Arbitrated near = printed_arbitration(pose(0.0, 0.0, kPi - 0.1), pose(1.0, 0.0, -kPi + 0.1), 1.0);
   CHECK(near.visual_used);
   CHECK(near.pose.position.x() == 0.5);
@@ -120,7 +120,7 @@ TEST_CASE("two motions are weighted by their covariances") {
   CHECK(mean.covariance(0, 0) == Approx(0.0075));
 }
 
-TEST_CASE("paper C's ramp goes there and back without a step") {
+TEST_CASE("Lee et al.'s ramp goes there and back without a step") {
   AdaptiveConfig c;
   c.ramp = 4.0;
   DropoutRamp ramp;
@@ -138,7 +138,7 @@ TEST_CASE("paper C's ramp goes there and back without a step") {
   CHECK(alpha_gnss(c, ConsistencyCheck{5.0}) == 1.0);
 }
 
-TEST_CASE("paper C's clip bounds the standard deviations and keeps the correlation") {
+TEST_CASE("Lee et al.'s clip bounds the standard deviations and keeps the correlation") {
   AdaptiveConfig c;
   Eigen::Matrix3d R = Eigen::Vector3d(1e-8, 1e6, 1e-2).asDiagonal();
   R(0, 1) = R(1, 0) = 0.5 * std::sqrt(R(0, 0) * R(1, 1));

@@ -142,7 +142,7 @@ TEST_CASE("mono takes its scale from the better source, from the configured one,
   CHECK(none.all<pose_t>("POSE_VO").back().scale == pose_t::SCALE_UNKNOWN);
 }
 
-/// Figures 5 to 7 of paper A: matches and inliers per image, and the class of each
+/// Figures 5 to 7 of Kim and Kang (2025): matches and inliers per image, and the class of each
 /// feature.
 TEST_CASE("the status counts the published features of every image") {
   for (const bool stereo : {true, false}) {
