@@ -12,7 +12,7 @@ extern const char* const kPageCss;
 extern const char* const kPageJs;
 extern const char* const kDrawJs;
 
-/// Puts a value in place of @KEY@.
+/// Puts a value in place of `@KEY@`.
 void replace_all(std::string& text, std::string_view key, const std::string& value);
 /// As text of a page.
 std::string html_safe(const std::string& text);
