@@ -34,7 +34,7 @@ class Evaluate(unittest.TestCase):
 
     def export(self, channel, form):
         path = self.folder / f"{channel}.{form}"
-        done = roadfix("export", self.log, "--channel", channel, "--format", form, "--out", path)
+        done = roadfix("export", self.log, "--channel", channel, "--format", form, "--out", path, "--overwrite")
         self.assertEqual(done.returncode, 0, done.stderr)
         return path.read_text()
 
@@ -100,7 +100,7 @@ class Evaluate(unittest.TestCase):
             (("evaluate", self.folder / "absent.lcm"), "absent.lcm"),
             (("evaluate", ROOT / "logs/demo.lcm"), "POSE_"),
             (("export", self.log, "--channel", "POSE_NONE", "--out", self.folder / "x"), "POSE_NONE"),
-            (("export", self.log, "--format", "gpx", "--out", self.folder / "x"), "gpx"),
+            (("export", self.log, "--format", "svg", "--out", self.folder / "x"), "svg"),
         ):
             done = roadfix(*words)
             self.assertEqual(done.returncode, 2, words)
