@@ -37,32 +37,28 @@ def check_available(folder, drive):
         raise Skipped(f"{drive}: available {available:.3f} of the time, 0.99 is asked for")
 
 
-def dark_channels(runs, seed):
-    """The figures of all channels on tunnel_dark. POSE_WHEEL has no ENU frame: it takes yaw and position over from the
-    reference once, at the last pose before the loss."""
-    return runs.simulated(BLIND, "tunnel_dark", seed, aligned=(("POSE_WHEEL", "tied"),))
-
-
-def dark_drive(runs, seed):
-    """The fused ones."""
-    figures = dark_channels(runs, seed)[CHANNEL]
-    check_available(runs.folder("tunnel_dark", seed), f"tunnel_dark, seed {seed}")
-    return figures
-
-
 def two_at_a_time(drive, runs, seeds):
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(lambda seed: drive(runs, seed), seeds))
 
 
+def dark_drives(runs):
+    """(figures of all channels, folder) on tunnel_dark with many seeds, in their order. POSE_WHEEL has no ENU frame: it takes yaw and position over from
+    the reference once, at the last pose before the loss."""
+    drives = runs.fleet(BLIND, "tunnel_dark", len(MANY_SEEDS), aligned=(("POSE_WHEEL", "tied"),))
+    for seed, (_, folder) in zip(MANY_SEEDS, drives):
+        check_available(folder, f"tunnel_dark, seed {seed}")
+    return drives
+
+
 def dark(runs):
-    """dark_drive() of many seeds, in their order."""
-    return runs.once("tunnel_dark", lambda: two_at_a_time(dark_drive, runs, MANY_SEEDS))
+    """The figures of the fused channel on those."""
+    return runs.once("tunnel_dark", lambda: [channels[CHANNEL] for channels, _ in dark_drives(runs)])
 
 
 def lit_drive(runs, seed):
     """The figures of all channels on tunnel_lit, the tracker on tracks without pixels (tools/experiments/fusion_tracks.cpp): stereo, with
-    the fusion's restarts. POSE_VO and POSE_WHEEL are tied as in dark_channels()."""
+    the fusion's restarts. POSE_VO and POSE_WHEEL are tied as in dark_drives()."""
     folder = runs.folder("tunnel_lit", seed)
     log, vehicle, out, report = folder / "drive.lcm", folder / "vehicle", folder / "out.lcm", folder / "report"
     runs.roadfix("simulate", "tunnel_lit", "--seed", seed, "--no-camera", "--out", log, "--vehicle", vehicle, "--overwrite")
@@ -116,10 +112,10 @@ def transition_ratio(runs):
 def return_settle_s(runs):
     """From the third good fix after an outage until the horizontal error is below 0.3 m; worst is never: the seeds' median."""
     times = []
-    for seed, figures in zip(MANY_SEEDS, dark(runs)):
-        for outage in figures["outages"]["each"]:
+    for channels, folder in dark_drives(runs):
+        for outage in channels[CHANNEL]["outages"]["each"]:
             third = outage["return_us"] + THIRD_GOOD_FIX_US
-            path = runs.folder("tunnel_dark", seed) / "report" / f"{CHANNEL}_errors.csv"
+            path = folder / "report" / f"{CHANNEL}_errors.csv"
             with open(path, newline="") as file:
                 rows = [row for row in csv.DictReader(file) if int(row["utime_us"]) >= third]
             near = (row for row in rows if math.hypot(float(row["longitudinal_m"]), float(row["lateral_m"])) < SETTLED_M)
@@ -161,11 +157,11 @@ def squared_errors(path, borders_us):
 def ate_vs_best(runs):
     """Fused over the best single channel before, in and after the outage, the worst of the three; RMSE over the seeds."""
     pooled = {channel: [[], [], []] for channel in (CHANNEL, "POSE_INS", "POSE_WHEEL")}
-    for seed, figures in zip(MANY_SEEDS, dark(runs)):
-        outage = figures["outages"]["each"][0]
+    for channels, folder in dark_drives(runs):
+        outage = channels[CHANNEL]["outages"]["each"][0]
         borders = (outage["first_withheld_us"], outage["return_us"])
         for channel, segments in pooled.items():
-            path = runs.folder("tunnel_dark", seed) / "report" / f"{channel}_errors.csv"
+            path = folder / "report" / f"{channel}_errors.csv"
             for segment, values in zip(segments, squared_errors(path, borders)):
                 segment += values
     rmse = {channel: [statistics.mean(s) ** 0.5 for s in segments] for channel, segments in pooled.items()}

@@ -68,8 +68,8 @@ def car_1hz(runs):
 def nees(runs):
     """NEES per degree of freedom of pose and velocity, mean over 50 simulated drives of two minutes."""
     ratios = []
-    for seed in range(1, NEES_SEEDS + 1):
-        honesty = runs.simulated(STAGES, "city_loop", seed, "--duration", 120)[CHANNEL]["honesty"]
+    for channels, _ in runs.fleet(STAGES, "city_loop", NEES_SEEDS, "duration_s=120"):
+        honesty = channels[CHANNEL]["honesty"]
         ratios.append((6 * honesty["pose"]["nees_per_dof"] + 3 * honesty["velocity_mps"]["nees_per_dof"]) / 9)
     return statistics.mean(ratios)
 

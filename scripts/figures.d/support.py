@@ -83,25 +83,20 @@ class Runs:
 
         return self.once(("import", drive, flags), run)
 
-    def simulated(self, stages, scenario, seed, *flags, aligned=()):
-        """The figures of every channel on one simulated drive; `aligned` has pairs (channel, alignment) that differ from
-        what the channel's frame suggests. The errors of a channel lie in report/CHANNEL_errors.csv of its folder."""
+    def fleet(self, stages, scenario, seeds, *words, aligned=()):
+        """(figures of every channel, folder) of a scenario with each of the seeds 1 to `seeds`, in their order, by `roadfix fleet`. Words are KEY=VALUE;
+        `aligned` has pairs (channel, alignment) that differ from what the channel's frame suggests. The errors of a channel lie in
+        report/CHANNEL_errors.csv of its drive's folder."""
 
         def run():
-            folder = self.folder(scenario, seed, *flags)
-            log, vehicle, out, report = folder / "drive.lcm", folder / "vehicle", folder / "out.lcm", folder / "report"
-            self.roadfix("simulate", scenario, "--seed", seed, *flags, "--out", log, "--vehicle", vehicle, "--overwrite")
-            self.roadfix("replay", log, "--stages", stages, "--config", vehicle, "--out", out)
-            self.roadfix("evaluate", out, "--out", report)
-            channels = json.loads((report / "figures.json").read_text())["channels"]
-            for channel, alignment in aligned:
-                self.roadfix("evaluate", out, "--out", report, "--channel", channel, "--align", alignment)
-                channels.update(json.loads((report / "figures.json").read_text())["channels"])
-            log.unlink()
-            out.unlink()
-            return channels
+            path = self.folder("fleet", scenario, *words)
+            align = [word for channel, alignment in aligned for word in ("--align", f"{channel}={alignment}")]
+            self.roadfix("fleet", "run", scenario, f"seeds=1..{seeds}", *words, "--stages", stages, *align, "--keep", "errors", "--engine", "local",
+                         "--out", path, "--overwrite")
+            folders = [path / "tasks" / f"{index:06}" for index in range(seeds)]
+            return [(json.loads((folder / "result.json").read_text())["figures"]["channels"], folder) for folder in folders]
 
-        return self.once(("simulated", stages, scenario, seed, flags, aligned), run)
+        return self.once(("fleet", stages, scenario, seeds, words, aligned), run)
 
     def folder(self, *words):
         name = "_".join(str(word).lstrip("-").replace(",", "_") for word in words) or "run"
