@@ -59,7 +59,7 @@ const std::vector<Figure>& known_figures() {
       {"yaw RMSE deg", 1e-2, [](const Json& c) { return scored(c, "/errors/yaw_deg/rmse"); }},
       {"outage ends RMS m", 1e-2, outage_end},
       {"NEES/dof above 1", 0.25, overconfidence},
-      {"not usable share", 1e-2, unavailable},
+      {"not available share", 1e-2, unavailable},
   };
   return kFigures;
 }

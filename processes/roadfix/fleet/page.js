@@ -2,7 +2,7 @@
 const data = JSON.parse(byId("data").textContent);
 const names = Object.keys(data.channels);
 const colorOf = (name) => palette[names.indexOf(name) % palette.length];
-const columns = ["horizontal RMSE m", "horizontal 95 % m", "vertical RMSE m", "yaw RMSE deg", "NEES/dof", "usable share"];
+const columns = ["horizontal RMSE m", "horizontal 95 % m", "vertical RMSE m", "yaw RMSE deg", "NEES/dof", "available share"];
 const finished = data.tasks.filter((t) => t.status === "ok");
 const valuesOf = (name, column) => finished.map((t) => (t.channels[name] || [])[column]).filter((v) => v !== null && v !== undefined);
 

@@ -39,9 +39,9 @@ void add_outages(const Json& outages, FleetChannel& channel) {
 Json add_channel(const Json& figures, FleetChannel& channel) {
   ++channel.drives;
   add_outages(figures.at("outages"), channel);
-  const double usable = number(figures, "/availability/valid") + number(figures, "/availability/coasting");
-  channel.usable.push_back(usable);
-  if (number(figures, "/scored") <= 0.0) return {nullptr, nullptr, nullptr, nullptr, nullptr, usable};
+  const double available = number(figures, "/availability/valid") + number(figures, "/availability/coasting");
+  channel.available.push_back(available);
+  if (number(figures, "/scored") <= 0.0) return {nullptr, nullptr, nullptr, nullptr, nullptr, available};
   channel.horizontal.push_back(number(figures, "/errors/horizontal_m/rmse"));
   channel.p95.push_back(number(figures, "/errors/horizontal_m/p95"));
   channel.vertical.push_back(number(figures, "/errors/vertical_m/rmse"));
@@ -55,7 +55,7 @@ Json add_channel(const Json& figures, FleetChannel& channel) {
           channel.vertical.back(),
           yaw >= 0.0 ? Json(yaw) : Json(nullptr),
           judged ? Json(channel.nees.back()) : Json(nullptr),
-          usable};
+          available};
 }
 
 void add_result(const Json& result, FleetSummary& summary, Json& row) {
@@ -86,7 +86,7 @@ std::string channel_row(const std::string& name, const FleetChannel& c) {
       "{:<14} {:>6}  {}  {}  {}  {:>8}  {:>9}  {:>9}\n", name, c.drives, distribution(c.horizontal),
       distribution(c.yaw), distribution(c.outage_m),
       c.nees.empty() ? "-" : fmt::format("{:.3g}", quantile(c.nees, 0.5)),
-      c.usable.empty() ? "-" : share(mean(c.usable)),
+      c.available.empty() ? "-" : share(mean(c.available)),
       c.samples == 0 ? "-" : fmt::format("{:.2g}", static_cast<double>(c.exceeded) / static_cast<double>(c.samples)));
 }
 
@@ -136,7 +136,7 @@ std::string fleet_table(const RunFolder& run, const FleetSummary& s) {
     text += fmt::format(" ({:.1f} s a drive-hour), at most {:.0f} MB", s.cpu_s / (s.drive_s / 3600.0), s.max_rss_mb);
   if (s.builds.size() > 1) text += fmt::format("\nnote: results of {} builds are mixed here", s.builds.size());
   text += fmt::format("\n{:<14} {:>6}  {:^29}  {:^29}  {:^29}  {:>8}  {:>9}  {:>9}\n", "", "", "horizontal RMSE m",
-                      "yaw RMSE deg", "horizontal at outage ends m", "NEES/dof", "usable", "above");
+                      "yaw RMSE deg", "horizontal at outage ends m", "NEES/dof", "available", "above");
   const std::string columns = fmt::format("{:>9} {:>9} {:>9}", "median", "95 %", "worst");
   text += fmt::format("{:<14} {:>6}  {}  {}  {}  {:>8}  {:>9}  {:>9}\n", "channel", "drives", columns, columns, columns,
                       "median", "mean", "3 sigma");

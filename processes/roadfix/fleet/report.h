@@ -16,7 +16,7 @@ namespace roadfix {
 struct FleetChannel {
   std::size_t drives = 0;
   std::vector<double> horizontal, p95, vertical, yaw;  ///< RMSE of each drive, m and deg; what was scored
-  std::vector<double> nees, within_3sigma, usable;     ///< of each drive
+  std::vector<double> nees, within_3sigma, available;  ///< of each drive
   std::vector<double> outage_m, outage_percent;        ///< of every outage of every drive, at its end
   int missing_outages = 0;
   std::string bound;  ///< what the errors are held against
