@@ -2,6 +2,7 @@
 // file.
 #include <CLI/CLI.hpp>
 
+#include "bus/log/output_place.h"
 #include "bus/run/command_line.h"
 #include "bus/run/run_process.h"
 #include "pose_server/pose_server_run.h"
@@ -23,11 +24,13 @@ int main(int argc, char** argv) {
   app.add_option("--log-in", options.logs,
                  "Sentences of this log instead; several: a drive and what was replayed from it");
   app.add_option("--out", options.out, "The file for a log's sentences; - is standard output");
+  arguments.add_overwrite();
   return arguments.run(argc, argv, [&] {
     options.vehicle = arguments.config;
     options.bus = arguments.bus;
     options.realtime = arguments.realtime;
     options.print_config = arguments.print_config;
+    roadfix::refuse_existing_file(options.out, arguments.overwrite);
     roadfix::catch_stop_signals();
     roadfix::run_pose_server(options);
     return 0;

@@ -116,6 +116,9 @@ class Tool(unittest.TestCase):
             for flags in ([], [], ["--overwrite"]):
                 codes.append(subprocess.run(command + flags, capture_output=True, check=False, timeout=120).returncode)
             self.assertEqual(codes, [0, 2, 0], words)
+        sentences = [str(BIN / "pose_server"), "--pose", "POSE_WHEEL", "--log-in", str(self.out), "--out", str(self.folder / "nmea")]
+        codes = [subprocess.run(sentences + flags, capture_output=True, check=False, timeout=120).returncode for flags in ([], [], ["--overwrite"])]
+        self.assertEqual(codes, [0, 2, 0])
 
     def test_what_is_wrong_is_said_under_the_subcommands_name(self):
         for words in self.all:
@@ -146,7 +149,7 @@ class Tool(unittest.TestCase):
 
     def test_version_everywhere(self):
         programs = ["roadfix", "gnss_ins_ekf", "imm_fusion", "vo_tracker", "wheel_odometry", "monitor", "recorder", "camera_driver",
-                    "gnss_driver", "imu_driver", "wheel_driver"]
+                    "gnss_driver", "imu_driver", "pose_server", "wheel_driver"]
         cmake = (ROOT / "CMakeLists.txt").read_text()
         version = re.search(r"project\(roadfix VERSION ([0-9.]+)", cmake)[1]
         said = set()

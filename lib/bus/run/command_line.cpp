@@ -38,7 +38,7 @@ void CommandLine::add_logs(const std::string& help_in, const std::string& help_o
   add_overwrite();
 }
 
-void CommandLine::add_overwrite() { app_->add_flag("--overwrite", overwrite, "Replace a log that is there already"); }
+void CommandLine::add_overwrite() { app_->add_flag("--overwrite", overwrite, "Replace what is there already"); }
 
 int CommandLine::run(int argc, char** argv, const std::function<int()>& work) {
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "roadfix";
