@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # roadfix fleet on this machine: tasks that die, hang, are stopped; disks that are full; inputs, configurations and storage that change. Whatever happens
 # costs the task it happens to, is said in its result, and resume runs what is left and nothing else.
-#   local.sh ROADFIX troubles|interrupted|full|keyed|storage|report [DEMO_LOG DEMO_CONFIG]
+#   local.sh ROADFIX troubles|interrupted|full|keyed|storage|report|compare [DEMO_LOG DEMO_CONFIG]
 set -euo pipefail
 roadfix=$1; what=$2
 if [[ $what == full && -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
@@ -141,7 +141,7 @@ storage)
   no_scratch_left
   ;;
 report)
-  # The page holds everything and fetches nothing; what is pooled is the sum of the drives; two runs of one build are no regression, a planted one is found.
+  # The page holds everything and fetches nothing; what is pooled is the sum of the drives.
   drives=(tunnel_dark camera=none seeds=1..3)
   flags=(--stages wheel_odometry,gnss_ins_ekf)
   echo 'no log' >"$folder/bad.lcm"
@@ -168,15 +168,22 @@ for name, channel in data["channels"].items():
     ends = [o["horizontal_m"] for f in well for o in f["channels"][name]["outages"]["each"]]
     assert channel["outages_m"] == ends and len(ends) == 3, name
 CHECK
-  "$roadfix" fleet run "${drives[@]}" "${flags[@]}" --out "$folder/again" >/dev/null || fail 'again'
-  rm "$(result "$run" 3)"
+  ;;
+compare)
+  # 200 drives: two runs of one build are no regression at no tolerance at all; one planted in a single drive is found and named.
+  drives=(turn camera=none duration_s=20)
+  flags=(--stages gnss_ins_ekf --keep none --batch 20)
+  "$roadfix" fleet run "${drives[@]}" seeds=1..200 "${flags[@]}" --out "$run" >/dev/null || fail 'run'
+  "$roadfix" fleet run "${drives[@]}" seeds=1..200 "${flags[@]}" --out "$folder/again" --reversed >/dev/null || fail 'again'
   "$roadfix" fleet compare "$run" "$folder/again" --tolerance 0 --mean-tolerance 0 >"$folder/out" || fail "$(cat "$folder/out")"
-  grep -q '3 drives in both, 3 with the same bits; 1 only in A' "$folder/out" || fail "$(cat "$folder/out")"
-  "$roadfix" fleet run tunnel_dark camera=none seeds=1..2 tunnel_dark camera=none seed=3 fault=gnss.bias@20+30:east_m=3 "${flags[@]}" --out "$folder/planted" >/dev/null || fail 'planted'
-  sed -i 's/ fault=gnss.bias@20+30:east_m=3"/"/' "$folder/planted/tasks.jsonl"
-  status=0; "$roadfix" fleet compare "$folder/again" "$folder/planted" >"$folder/out" || status=$?
+  grep -q '^200 drives in both, 200 with the same bits$' "$folder/out" || fail "$(cat "$folder/out")"
+  "$roadfix" fleet run "${drives[@]}" seeds=1..136,138..200 "${drives[@]}" seed=137 fault=gnss.bias@12+8:east_m=0.2 "${flags[@]}" --out "$folder/planted" \
+    >/dev/null || fail 'planted'
+  sed -i 's/ fault=gnss.bias[^"]*"/"/' "$folder/planted/tasks.jsonl"    # the name of the drive that it is to be compared with
+  status=0; "$roadfix" fleet compare "$run" "$folder/planted" >"$folder/out" || status=$?
   [[ $status -eq 1 ]] || fail "a planted regression: status $status"
-  grep -q '^ .*tunnel_dark camera=none seed=3$' "$folder/out" && grep -q 'REGRESSION: 1 drives' "$folder/out" || fail "$(cat "$folder/out")"
+  grep -q '^200 drives in both, 199 with the same bits$' "$folder/out" || fail "$(cat "$folder/out")"
+  grep -qE '^ .* seed=137$' "$folder/out" && grep -q 'REGRESSION: 1 drives worse' "$folder/out" || fail "$(cat "$folder/out")"
   ;;
 esac
 echo "$what: as wanted"

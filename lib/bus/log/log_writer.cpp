@@ -116,13 +116,14 @@ void LogWriter::flush(bool to_disk) {
   if (to_disk && ::fdatasync(fd_) != 0 && errno != EINVAL) throw_log_error(written_path_, kNotTaken);
 }
 
-void LogWriter::commit() {
-  flush(true);
+void LogWriter::commit(bool to_disk) {
+  flush(to_disk);
   if (written_path_ != path_ && ::rename(written_path_.c_str(), path_.c_str()) != 0) {
     throw_log_error(path_, "cannot give the log its name");
   }
   ::close(fd_);
   fd_ = -1;
+  if (!to_disk) return;
   const std::filesystem::path folder = path_.has_parent_path() ? path_.parent_path() : ".";
   const int folder_fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder_fd >= 0) {

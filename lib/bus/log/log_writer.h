@@ -31,8 +31,9 @@ class LogWriter {
   /// Hands what was written to the system; `to_disk` waits until the disk has it.
   void flush(bool to_disk);
 
-  /// Everything is on the disk and under its final name when this returns.
-  void commit();
+  /// Everything is under its final name when this returns; and on the disk, unless the log is one that is read and
+  /// deleted at once.
+  void commit(bool to_disk = true);
 
   [[nodiscard]] int64_t events() const { return events_; }
   [[nodiscard]] uint64_t bytes() const { return bytes_; }

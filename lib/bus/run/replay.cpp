@@ -196,7 +196,7 @@ ReplaySummary Replayer::run() {
       next_report = begin + messages.size() / 100 + 1;
     }
   }
-  writer_.commit();
+  writer_.commit(options_.to_disk);
   if (options_.progress) options_.progress(1.0);
   return summary();
 }

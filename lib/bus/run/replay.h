@@ -19,6 +19,7 @@ struct ReplayOptions {
   /// Of the input log, copied to the output where they are there: what an evaluation needs beside the estimates.
   std::vector<std::string> copied_channels = {"CONFIG_DRIVE", "REFERENCE"};
   bool timing = false;
+  bool to_disk = true;  ///< wait until the disk has the output
   /// Begins each stage at its last recorded snapshot up to so many seconds into the log.
   std::optional<double> from_s;
   std::function<void(double share)> progress;  ///< called now and then with what is done, 0 to 1

@@ -64,7 +64,7 @@ class DriveMaker {
     const SimulatedDrive made = simulate(configured_scenario(drive_.scenario, remarks), drive_.seed);
     calibration_ = calibration_text(calibration_of(made));
     ThreadPool threads(plan_.threads);
-    write_simulated_log(made, log, {threads});
+    write_simulated_log(made, log, {.executor = threads, .to_disk = false});
     return log;
   }
 

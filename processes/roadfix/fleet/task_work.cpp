@@ -170,7 +170,9 @@ Json do_task(const RunFolder& run, const FleetPlan& plan, const FleetTask& task,
   const TaskInputs inputs = make_inputs(plan, task, drive, scratch);
   const double input_s = laps.lap();
   const fs::path outputs = scratch / "out.lcm";
-  const ReplaySummary replayed = replay(inputs.log, outputs, make_stages(plan.stages, inputs.vehicle));
+  ReplayOptions scratch_log;
+  scratch_log.to_disk = false;
+  const ReplaySummary replayed = replay(inputs.log, outputs, make_stages(plan.stages, inputs.vehicle), scratch_log);
   const double replay_s = laps.lap();
   const EvaluationReport report = evaluate_log(request_of(plan, outputs));
   Json figures = report_json(report);

@@ -271,7 +271,7 @@ std::string write_simulated_log(const SimulatedDrive& drive, const std::filesyst
   for (const Event& e : list.events) {
     writer.write(list.channels[static_cast<std::size_t>(e.channel)], e.arrival_us, e.bytes());
   }
-  writer.commit();
+  writer.commit(work.to_disk);
   std::string text;
   for (std::size_t i = 0; i < list.channels.size(); ++i) {
     text += fmt::format("  {:<13} {:>8}\n", list.channels[i], list.counts[i]);

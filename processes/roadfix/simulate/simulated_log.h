@@ -27,6 +27,7 @@ DriveFacts facts_of(const SimulatedDrive& drive);
 struct PictureWork {
   Executor& executor;
   std::function<void(std::size_t)> progress = [](std::size_t) {};
+  bool to_disk = true;  ///< wait until the disk has the log
 };
 
 /// Returns one line per channel. Pictures are drawn while the log is written.
