@@ -5,11 +5,10 @@ import math
 import statistics
 from concurrent.futures import ThreadPoolExecutor
 
-from support import Skipped, root_mean_square
+from support import Skipped
 
 CHANNEL = "POSE_FUSED"
 BLIND = "wheel_odometry,gnss_ins_ekf,imm_fusion"  # wheels and IMU alone
-SEEING = "wheel_odometry,gnss_ins_ekf,vo_tracker,imm_fusion"
 SEEDS = range(1, 21)
 # Where figures.tsv asks for no number of seeds: the median of 20 of these ratios scatters by a third (lib/fusion/EVIDENCE.md, E6).
 MANY_SEEDS = range(1, 201)
@@ -19,7 +18,6 @@ LATEST_START_US = 500_000  # after POSE_INS
 # The fixes after the tunnel begin 4 m off and come back with 3 s (scenario tunnel_*: gnss.reacquire); they are good once that is
 # within three of the sigmas of 0.3 m that they claim. Two more at 5 Hz make three.
 THIRD_GOOD_FIX_US = int(3e6 * math.log(4 / (3 * 0.3))) + 400_000
-BRIDGE_US = 30_000_000  # before the tunnel
 SETTLED_M = 0.3
 
 
@@ -83,18 +81,6 @@ def lit_end_pct(runs):
     return statistics.median(100 * o["horizontal_m"] / o["distance_m"] for o in each)
 
 
-def ate_vs_best_bridge(runs):
-    """Fused over the best single channel of the half minute of bad fixes before the tunnel; RMSE over the seeds."""
-    pooled = {channel: [] for channel in (CHANNEL, "POSE_INS", "POSE_VO", "POSE_WHEEL")}
-    for seed, channels in zip(SEEDS, lit(runs)):
-        end = channels[CHANNEL]["outages"]["each"][0]["first_withheld_us"]
-        for channel, values in pooled.items():
-            path = runs.folder("tunnel_lit", seed) / "report" / f"{channel}_errors.csv"
-            values += squared_errors(path, (end - BRIDGE_US, end))[1]
-    rmse = {channel: statistics.mean(values) ** 0.5 for channel, values in pooled.items()}
-    return rmse[CHANNEL] / min(value for channel, value in rmse.items() if channel != CHANNEL)
-
-
 def outages(runs):
     for figures in dark(runs):
         yield from figures["outages"]["each"]
@@ -144,41 +130,8 @@ def mpa_balanced_pct(runs):
     return statistics.mean(figures["mpa"]["balanced_percent"] for figures in dark(runs))
 
 
-def squared_errors(path, borders_us):
-    """Squared horizontal errors of an errors.csv: before the loss, in the outage, after the return."""
-    segments = [[], [], []]
-    with open(path, newline="") as file:
-        for row in csv.DictReader(file):
-            segment = sum(int(row["utime_us"]) >= border for border in borders_us)
-            segments[segment].append(float(row["longitudinal_m"]) ** 2 + float(row["lateral_m"]) ** 2)
-    return segments
-
-
-def ate_vs_best(runs):
-    """Fused over the best single channel before, in and after the outage, the worst of the three; RMSE over the seeds."""
-    pooled = {channel: [[], [], []] for channel in (CHANNEL, "POSE_INS", "POSE_WHEEL")}
-    for channels, folder in dark_drives(runs):
-        outage = channels[CHANNEL]["outages"]["each"][0]
-        borders = (outage["first_withheld_us"], outage["return_us"])
-        for channel, segments in pooled.items():
-            path = folder / "report" / f"{channel}_errors.csv"
-            for segment, values in zip(segments, squared_errors(path, borders)):
-                segment += values
-    rmse = {channel: [statistics.mean(s) ** 0.5 for s in segments] for channel, segments in pooled.items()}
-    return max(rmse[CHANNEL][k] / min(rmse["POSE_INS"][k], rmse["POSE_WHEEL"][k]) for k in range(3))
-
-
 def adis_wheels_60s_m(runs):
     return runs.windows(CHANNEL, BLIND, "adis_semisim", 60, 300, 180, (0, 30, 60, 90, 120, 150))
-
-
-def malaga_20s_m(runs):
-    """The drive's one window, against the fixes, the receiver's constant latency fitted."""
-    cut = ("--cut-gnss", 20, "--every", 100, "--after", 20, "--phase", 0)
-    figures = runs.scored(CHANNEL, SEEING, "malaga07_part1", *cut, evaluate=("--fit-latency",))
-    if figures["outages"]["missing"]:  # one fix a second of a position alone: POSE_INS has no heading before second 34
-        raise Skipped("the outage ends without an estimate: POSE_INS is not aligned when it begins")
-    return root_mean_square(outage["horizontal_m"] for outage in figures["outages"]["each"])
 
 
 MEASUREMENTS = {
@@ -186,12 +139,9 @@ MEASUREMENTS = {
     "dark_end_pct": dark_end_pct,
     "transition_ratio": transition_ratio,
     "return_settle_s": return_settle_s,
-    "ate_vs_best": ate_vs_best,
-    "ate_vs_best_bridge": ate_vs_best_bridge,
     "mpa_balanced_pct": mpa_balanced_pct,
     "nees": nees,
     "within_3sigma": within_3sigma,
     "adis_wheels_60s_m": adis_wheels_60s_m,
-    "malaga_20s_m": malaga_20s_m,
     "step_us": lambda runs: runs.benchmark("fusion_bench", "cpu_per_step_s") * 1e6,
 }
