@@ -51,7 +51,7 @@ double difference(const Make& make, const Mean& x, const BodyMotion& motion, con
 
 template <int Rows, class Make>
 void check_everywhere(const Make& make) {
-  test::RandomState random(7);
+  test::RandomNavigationState random(7);
   BodyMotion motion;
   (void)difference<Rows>(make, Mean(), motion, Eigen::Vector3d::Zero());
   for (int i = 0; i < 20; ++i) {
@@ -117,7 +117,7 @@ TEST_CASE("standstill Jacobians") {
 }
 
 TEST_CASE("velocity rows leave the heading unobserved, and one with phi would not") {
-  test::RandomState random(3);
+  test::RandomNavigationState random(3);
   for (int i = 0; i < 20; ++i) {
     const State s = with_mean(random.mean(0.1), Eigen::Vector3d::Zero());
     BodyMotion motion;

@@ -8,9 +8,9 @@
 
 namespace roadfix::test {
 
-class RandomState {
+class RandomNavigationState {
  public:
-  explicit RandomState(unsigned seed) : rng_(seed) {}
+  explicit RandomNavigationState(unsigned seed) : rng_(seed) {}
 
   double number(double scale) { return scale * std::normal_distribution<double>()(rng_); }
   Eigen::Vector3d vector(double scale) {

@@ -10,7 +10,7 @@ using namespace roadfix::navigation;
 
 namespace {
 
-State random_state(test::RandomState& random, int clones) {
+State random_state(test::RandomNavigationState& random, int clones) {
   State s(true);
   s.reset(random.mean(0.3), BaseVector::Ones());
   Eigen::MatrixXd L(kBaseSize, kBaseSize);
@@ -35,7 +35,7 @@ bool symmetric(const State& s) {
 }  // namespace
 
 TEST_CASE("retract and local are inverse, about any reference point") {
-  test::RandomState random(1);
+  test::RandomNavigationState random(1);
   for (int i = 0; i < 20; ++i) {
     const Mean x = random.mean(0.5), y = random.mean(0.5);
     const Eigen::Vector3d p_ref = random.vector(50.0);
@@ -46,7 +46,7 @@ TEST_CASE("retract and local are inverse, about any reference point") {
 }
 
 TEST_CASE("moving the reference point changes no pose's uncertainty, and is undone by moving it back") {
-  test::RandomState random(2);
+  test::RandomNavigationState random(2);
   State s = random_state(random, 3);
   const auto position_of_clone = [](const State& state) {  // covariance of an oldest clone's place in the level frame
     const Clone& c = state.clones.front();
@@ -67,7 +67,7 @@ TEST_CASE("moving the reference point changes no pose's uncertainty, and is undo
 
 TEST_CASE("a turn of everything about gravity is free of the reference point's motion") {
   // (N.1.6): phi = e_z, rho = 0 about p_ref becomes phi = e_z, rho = -[d]x e_z, for every pose alike.
-  test::RandomState random(4);
+  test::RandomNavigationState random(4);
   State s = random_state(random, 2);
   Eigen::VectorXd turn = Eigen::VectorXd::Zero(s.size());
   turn(kAtt + 2) = 1e-4;
@@ -85,7 +85,7 @@ TEST_CASE("a turn of everything about gravity is free of the reference point's m
 }
 
 TEST_CASE("updates and shrinking keep the covariance symmetric to the bit") {
-  test::RandomState random(5);
+  test::RandomNavigationState random(5);
   for (const int columns : {1, 3, 20}) {
     State s = random_state(random, 4);
     Eigen::MatrixXd Y(s.size(), columns);
@@ -102,7 +102,7 @@ TEST_CASE("updates and shrinking keep the covariance symmetric to the bit") {
 }
 
 TEST_CASE("a snapshot restores the state to the bit, and a wrong size is refused") {
-  test::RandomState random(6);
+  test::RandomNavigationState random(6);
   State s = random_state(random, 3);
   StateArchiveOut out;
   s.serialise(out);
