@@ -131,11 +131,16 @@ class Runs:
         return self.once(("score", channel, stages, drive, flags, evaluate), run)
 
     def windows(self, channel, stages, drive, length, first, every, phases, *flags):
-        """RMS of the horizontal errors at the ends of all outages of all phases, m; one run a phase."""
+        """RMS of the horizontal errors at the ends of all outages of all phases, m; one drive of a fleet a phase. Flags are those of roadfix import."""
+        self.drive(drive)
+        changes = [f"{key.lstrip('-')}={value}" for key, value in zip(flags[::2], flags[1::2])]
+        cut = (f"cut_gnss_s={length}", f"every_s={every}", f"after_s={first}", f"phase_s={','.join(map(str, phases))}")
+        path = self.folder("fleet", drive, length, first, every, *flags)
+        self.roadfix("fleet", "run", drive, *cut, *changes, "--root", self.shared / "data", "--stages", stages, "--channel", channel, "--keep", "none",
+                     "--engine", "local", "--out", path, "--overwrite")
         ends = []
-        for phase in phases:
-            cut = ("--cut-gnss", length, "--every", every, "--after", first, "--phase", phase)
-            outages = self.scored(channel, stages, drive, *cut, *flags)["outages"]
+        for phase, result in zip(phases, sorted(path.glob("tasks/*/result.json"))):
+            outages = json.loads(result.read_text())["figures"]["channels"][channel]["outages"]
             if outages["missing"]:
                 raise Skipped(f"{outages['missing']} outages of phase {phase} end without an estimate")
             ends += [outage["horizontal_m"] for outage in outages["each"]]
