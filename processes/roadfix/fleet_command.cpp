@@ -102,6 +102,8 @@ void status(const FolderOptions& options) {
   const RunFolder folder(options.run);
   const std::vector<TaskStatus> tasks = survey(folder, folder.plan());
   std::cout << status_text(folder, tasks, options.failures);
+  if (const std::optional<double> left_s = time_left(folder, tasks); left_s)
+    std::cout << "about " << duration_text(*left_s) << " left\n";
   if (const std::vector<std::string> jobs = unfinished_slurm_jobs(folder.path()); !jobs.empty())
     std::cout << fmt::format("Slurm has still to end job {}\n", fmt::join(jobs, ", "));
   finish(count(tasks, TaskState::kOk) == tasks.size() ? 0 : kFleetFailed);

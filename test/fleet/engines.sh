@@ -34,11 +34,11 @@ interrupted)
 slurm)
   export ROADFIX_FLEET_ENGINE=slurm
   # An array of batches, in the partition that was asked for.
-  "$roadfix" fleet run "${drives[@]}" "${flags[@]}" --out "$run" --batch 2 --wait --partition other --sbatch-option=--comment=ours >"$folder/out" 2>&1 || fail "$(cat "$folder/out")"
+  "$roadfix" fleet run "${drives[@]}" "${flags[@]}" --out "$run" --batch 2 --wait --partition other --account ours --sbatch-option=--comment=hello >"$folder/out" 2>&1 || fail "$(cat "$folder/out")"
   [[ $(digests "$run") == "$(digests "$folder/local")" ]] || fail 'other digests with Slurm'
   id=$(cat "$run/jobs/slurm_jobs.txt")
   scontrol show job "${id}_3" >"$folder/job"
-  for words in 'Partition=other' 'Comment=ours' 'Requeue=1' 'ArrayTaskId=3' 'TimeLimit=02:05:00'; do grep -q "$words" "$folder/job" || fail "no $words: $(cat "$folder/job")"; done
+  for words in 'Partition=other' 'Account=ours' 'Comment=hello' 'Requeue=1' 'ArrayTaskId=3' 'TimeLimit=02:05:00'; do grep -q "$words" "$folder/job" || fail "no $words: $(cat "$folder/job")"; done
   "$roadfix" fleet run "${drives[@]}" "${flags[@]}" --out "$folder/no" --partition none >"$folder/out" 2>&1 && fail 'a partition that is none'
   grep -q 'sbatch: .*invalid partition' "$folder/out" || fail "$(cat "$folder/out")"
 

@@ -26,8 +26,9 @@ std::string what_differs(const TaskKey& key, const FleetPlan& plan, const FleetT
   return "of another input";
 }
 
-std::string why_missing(const RunFolder& run, std::size_t index) {
+std::string why_missing(const RunFolder& run, std::size_t index, bool& at_work) {
   const TaskBegun state = begun(run, index);
+  at_work = state.running;
   if (state.who.empty()) return "not begun";
   return state.running ? "at work: " + state.who : "ended without a word, killed perhaps: " + state.who;
 }
@@ -40,7 +41,7 @@ std::vector<TaskStatus> survey(const RunFolder& run, const FleetPlan& plan) {
     TaskStatus status{std::move(task), TaskState::kMissing, ""};
     const std::optional<ResultHead> head = run.head(status.task.index);
     if (!head) {
-      status.why = why_missing(run, status.task.index);
+      status.why = why_missing(run, status.task.index, status.at_work);
     } else if (!head->ok) {
       status.state = TaskState::kFailed;
       status.why = head->reason;
@@ -62,6 +63,19 @@ std::vector<TaskStatus> survey(const RunFolder& run, const FleetPlan& plan) {
 std::size_t count(const std::vector<TaskStatus>& tasks, TaskState state) {
   return static_cast<std::size_t>(
       std::count_if(tasks.begin(), tasks.end(), [&](const TaskStatus& t) { return t.state == state; }));
+}
+
+std::optional<double> time_left(const RunFolder& run, const std::vector<TaskStatus>& tasks) {
+  std::vector<fs::file_time_type> ended;
+  for (const TaskStatus& t : tasks) {
+    if (t.state == TaskState::kOk || t.state == TaskState::kFailed)
+      ended.push_back(written_at(run.result_path(t.task.index)));
+  }
+  const bool at_work = std::any_of(tasks.begin(), tasks.end(), [](const TaskStatus& t) { return t.at_work; });
+  if (ended.size() < 2 || !at_work) return std::nullopt;
+  const auto [first, last] = std::minmax_element(ended.begin(), ended.end());
+  const double each_s = std::chrono::duration<double>(*last - *first).count() / static_cast<double>(ended.size() - 1);
+  return each_s * static_cast<double>(tasks.size() - ended.size());
 }
 
 FleetProgress::FleetProgress(const RunFolder& run, const std::vector<std::size_t>& waiting)

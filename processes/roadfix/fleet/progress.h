@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,12 +22,17 @@ struct TaskStatus {
   FleetTask task;
   TaskState state = TaskState::kMissing;
   std::string why;  ///< of all but ok
+  bool at_work = false;
 };
 
 /// Of every task, compared with what the plan says now; reads an input where its stamp is another one.
 std::vector<TaskStatus> survey(const RunFolder& run, const FleetPlan& plan);
 
 std::size_t count(const std::vector<TaskStatus>& tasks, TaskState state);
+
+/// How long the missing tasks will take at the pace at which results came, s; nothing where no task is at work or fewer
+/// than two results are there.
+std::optional<double> time_left(const RunFolder& run, const std::vector<TaskStatus>& tasks);
 
 /// Counts results as they appear and says how long the rest will take at the pace so far.
 class FleetProgress {

@@ -139,6 +139,22 @@ TEST_CASE("fleet: progress counts results that are new, and those alone") {
   CHECK(progress.failed() == 1);
 }
 
+TEST_CASE("fleet: what is left is told from the pace of the results, while somebody is at work") {
+  const test::TemporaryFolder folder;
+  const RunFolder run(folder / "run");
+  std::vector<TaskStatus> tasks(5);
+  const auto now = std::filesystem::file_time_type::clock::now();
+  for (std::size_t i = 0; i < 3; ++i) {
+    tasks[i].task.index = i;
+    tasks[i].state = i == 1 ? TaskState::kFailed : TaskState::kOk;
+    run.write_result(i, result("ok", {}));
+    std::filesystem::last_write_time(run.result_path(i), now - std::chrono::seconds(10 * i));
+  }
+  CHECK_FALSE(time_left(run, tasks));
+  tasks[4].at_work = true;
+  CHECK(time_left(run, tasks).value() == Approx(20.0));
+}
+
 TEST_CASE("fleet: durations are said as people say them") {
   CHECK(duration_text(45.2) == "45 s");
   CHECK(duration_text(725) == "12 min");
