@@ -147,14 +147,14 @@ void put_through_it(const test::DriverUnderTest& driver, const DriverSetup& setu
   rig.run_for(Says::kGarbage, 0.7);
   say(driver.name + " after garbage", rig.recovery_s());
   const auto told = [&] { return rig.heartbeat().state_reason.find("no byte for") != std::string::npos; };
-  CHECK(rig.run_until(Says::kNothing, 10.0, told));
+  CHECK(rig.run_until(Says::kNothing, 60.0, told));
   say(driver.name + " after silence", rig.recovery_s());
   rig.unplug_for(0.5);
   say(driver.name + " plugged in again", rig.recovery_s());
 
   rig.run_for(Says::kFrames, 0.3);
   // On a busy machine the last bytes and the heartbeat that counts them may take their time.
-  rig.run_until(Says::kNothing, 20.0,
+  rig.run_until(Says::kNothing, 60.0,
                 [&] { return ends_with_the_last_byte(rig) && is_every_byte_counted(rig, driver); });
   const std::vector<raw_t> raw = rig.raw();
   const std::vector<Bytes> found = stretches(raw);

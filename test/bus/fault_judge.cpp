@@ -5,6 +5,8 @@
 // only ends the one before):
 //   verdict_s    from the beginning to the first HEALTH with such a reason that did not hold before (- where none came)
 //   recovery_s   from the end to the first HEALTH from which on no new reason holds (- where some stay)
+//   came         whether such a reason came at all before the drive's end;    stayed   new reasons of this time that were
+//   never gone again after the fault's end
 //   silent_s     longest time between two POSE_FUSED;    unusable_s   longest time without one that is not invalid
 //   jump_m       largest step of usable poses beside their velocity that no reset tells;    error_m   largest
 //   horizontal error of usable poses sigmas       the largest such error in standard deviations where it is over
@@ -152,11 +154,34 @@ class Judge {
       if (open && !any) recovery_s = std::max(0.0, seconds(told.at_us - fault.end_us));
       open = any;
     }
+    print_order(fault, before, news);
     std::cout << " verdict_s=" << (verdict_s ? std::to_string(*verdict_s) : "-")
               << " recovery_s=" << (open ? "-" : std::to_string(recovery_s)) << " reasons=";
     for (const std::string& key : news) std::cout << key << ",";
     std::cout << " before=";
     for (const std::string& key : before) std::cout << key << ",";
+  }
+
+  /// What holds however slowly everything runs: whether an expected reason ever came after the beginning, and which of
+  /// the new reasons was never gone again after the end, until the drive's.
+  void print_order(const Fault& fault, const std::set<std::string>& before, std::set<std::string> news) const {
+    bool came = false;
+    std::set<std::string> seen, gone;
+    for (const Told& told : told_) {
+      if (told.at_us < fault.begin_us) continue;
+      for (const std::string& key : told.keys) {
+        const bool expected = !before.contains(key) && std::regex_match(key, fault.expected);
+        came = came || expected;
+        if (expected) news.insert(key);
+        seen.insert(key);
+      }
+      if (told.at_us < fault.end_us) continue;
+      for (const std::string& key : seen)
+        if (!told.keys.contains(key)) gone.insert(key);
+    }
+    std::cout << " came=" << came << " stayed=";
+    for (const std::string& key : news)
+      if (!gone.contains(key)) std::cout << key << ",";
   }
 
   void print_poses(int64_t from_us, int64_t until_us) const {

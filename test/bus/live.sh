@@ -43,7 +43,12 @@ record() {
 [[ $trouble == late_recording ]] || record
 for name in odometry fusion; do start $name; done
 start filter "$starved_url"
-sleep 1
+source "$(dirname "$0")/listeners.sh"
+case $trouble in
+  ip_loss) await_listeners 2; sleep 3 ;;  # the stages listen in the other namespace
+  late_recording) await_listeners 3 ;;
+  *) await_listeners 5 ;;
+esac
 player=("$bin/play_drive" "$url")
 case $trouble in
   silent_clock) player+=(14 IMU 5 8) ;;

@@ -18,7 +18,7 @@ void publish(NetworkBus& bus, const std::string& channel, int count, std::size_t
 /// Handles what comes until `done`, or for ten seconds.
 template <class Done>
 bool handle_until(NetworkBus& bus, const Done& done) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (!done() && std::chrono::steady_clock::now() < end) bus.handle(std::chrono::milliseconds(50));
   return done();
 }

@@ -78,6 +78,13 @@ def watch(readers, seconds):
         time.sleep(0.01)
 
 
+def watch_until(readers, done):
+    """For a minute at most, however slowly everything runs."""
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end and not done():
+        watch(readers, 0.2)
+
+
 def start(processes, *command, **options):
     process = subprocess.Popen([str(word) for word in command], **options)
     processes.append(process)
@@ -102,14 +109,16 @@ def begin(processes, folder):
     return server, found.group(1)
 
 
-def check_sentences(reader, name, seconds):
+def positions(reader):
+    return [fields for fields in reader.of("GGA") if fields[6] != "0"]
+
+
+def check_sentences(reader, name, count):
     check(all(checksum_holds(line) for _, line in reader.lines), f"{name}: a sentence's checksum is wrong")
-    with_position = [fields for fields in reader.of("GGA") if fields[6] != "0"]
-    check(len(with_position) > 5 * seconds, f"{name}: {len(with_position)} positions in {seconds} s")
+    with_position = positions(reader)
+    check(len(with_position) >= count, f"{name}: {len(with_position)} positions, not {count}")
     times = [fields[1] for fields in with_position]
     check(times == sorted(set(times)), f"{name}: times do not go forward")
-    gaps = [b - a for (a, _), (b, _) in zip(reader.lines, reader.lines[1:])]
-    check(max(gaps) < 2.0, f"{name}: nothing came for {max(gaps):.1f} s")
 
 
 def check_driver(folder, recorder, sent):
@@ -151,10 +160,10 @@ def run(processes, folder):
     start(processes, BIN / "gnss_driver", "--config", folder, "--bus", GNSS_BUS)
     recorder = start(processes, BIN / "recorder", "--bus", GNSS_BUS, "--folder", folder / "recordings", stdout=subprocess.DEVNULL)
     player = start(processes, "lcm-logplayer", LOG, stdout=subprocess.DEVNULL)
-    seconds = 12
-    watch(readers.values(), seconds)
+    count = 100  # of 10 Hz, and far more than fits into the buffers of the client that takes nothing
+    watch_until(readers.values(), lambda: all(len(positions(reader)) >= count for reader in readers.values()))
     for name, reader in readers.items():
-        check_sentences(reader, name, seconds)
+        check_sentences(reader, name, count)
     pty_lines, tcp_lines = {line for _, line in readers["pty"].lines}, {line for _, line in readers["tcp"].lines}
     check(len(pty_lines & tcp_lines) > 0.8 * len(tcp_lines), "the pseudo-terminal got other sentences than TCP")
     check_driver(folder, recorder, [fields for fields in readers["tcp"].of("GGA") if fields[6] != "0"])

@@ -22,7 +22,8 @@ if [[ $trouble == full ]]; then
 fi
 [[ $trouble == limited ]] && ulimit -f 100  # KiB
 "$bin/recorder" --config "$folder/vehicle" --folder "$disk" --bus "$url" >"$folder/out" 2>"$folder/err" & recorder=$!
-sleep 1
+source "$(dirname "$0")/listeners.sh"
+await_listeners 1
 "$bin/play_drive" "$url" "$seconds" >/dev/null & player=$!
 if [[ $trouble == killed ]]; then
   sleep 3; kill -KILL $recorder

@@ -126,7 +126,7 @@ void RecoveryRig::kill_driver() {
   // Whatever came out of the old one has come; the next is the new one's, which says first that it opened the device.
   run_for(Says::kFrames, 0.05);
   const std::size_t before = received_[driver_.raw_channel].size();
-  run_until(Says::kFrames, 30.0, [&] { return received_[driver_.raw_channel].size() > before; });
+  run_until(Says::kFrames, 60.0, [&] { return received_[driver_.raw_channel].size() > before; });
   gaps_.push_back({from - std::min(from, kUnderWay), device_.sent().size()});
 }
 
@@ -137,7 +137,7 @@ void RecoveryRig::unplug_for(double seconds) {
   device_.plug_in();
   trouble_ = std::chrono::steady_clock::now();
   const std::size_t before = received_[driver_.raw_channel].size();
-  run_until(Says::kNothing, 30.0, [&] { return received_[driver_.raw_channel].size() > before; });
+  run_until(Says::kNothing, 60.0, [&] { return received_[driver_.raw_channel].size() > before; });
   gaps_.push_back({from - std::min(from, kUnderWay), device_.sent().size()});
 }
 

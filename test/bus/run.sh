@@ -3,7 +3,7 @@
 # stage that is killed comes back after a wait; Ctrl-C stops all, the last started first; the recording verifies.
 #   run.sh BIN CONFIG LOG
 set -euo pipefail
-bin=$1; config=$(realpath "$2"); log=$(realpath "$3")
+here=$(realpath "$(dirname "$0")"); bin=$1; config=$(realpath "$2"); log=$(realpath "$3")
 if [[ -z ${ROADFIX_IN_NAMESPACE:-} ]]; then
   command -v lcm-logplayer >/dev/null || { echo "skipped: no lcm-logplayer"; exit 0; }
   unshare -n true 2>/dev/null || { echo "skipped: no right to make a network namespace"; exit 0; }
@@ -26,8 +26,9 @@ cp -r "$config" vehicle
 printf 'min_free_gib: 0\n' >vehicle/recorder.yaml
 "$bin/roadfix" log cut "$log" --to-s 14 --out cut.lcm >/dev/null
 "$bin/roadfix" run vehicle >said 2>err & run=$!
-for _ in $(seq 100); do [[ $(grep -c started said) -ge $(grep -c 'name:' vehicle/run.yaml) ]] && break; sleep 0.1; done
-sleep 2
+for _ in $(seq 600); do [[ $(grep -c started said) -ge $(grep -c 'name:' vehicle/run.yaml) ]] && break; sleep 0.1; done
+source "$here/listeners.sh"
+await_listeners "$(grep -c 'name:' vehicle/run.yaml)"
 # README's page is that of the monitor which runs; another one takes another port, is silent, and says both.
 "$bin/monitor" --config vehicle --plain >/dev/null 2>second & second=$!
 for _ in $(seq 600); do grep -q 'only shows' second && break; sleep 0.1; done

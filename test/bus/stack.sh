@@ -29,7 +29,8 @@ stages=()
 for name in "${names[@]}"; do
   "$bin/$name" --config "$config" --bus "$url" 2>>"$folder/stages.err" & stages+=($!)
 done
-sleep 1
+source "$(dirname "$0")/listeners.sh"
+await_listeners $((${#names[@]} + 2))
 lcm-logplayer --lcm-url="$url" "$folder/cut.lcm" >/dev/null 2>&1
 sleep 0.5
 for pid in "${stages[@]}"; do kill -INT "$pid"; done

@@ -22,14 +22,14 @@ PY
 until [[ -S $folder/notify ]]; do sleep 0.05; done
 heard() { grep -c "^$1" "$folder/heard" || true; }
 wait_for() {  # WHAT HOW_OFTEN
-  for _ in $(seq 200); do [[ $(heard "$1") -ge $2 ]] && return; sleep 0.1; done
+  for _ in $(seq 600); do [[ $(heard "$1") -ge $2 ]] && return; sleep 0.1; done
   echo "$program: $1 heard $(heard "$1") times, not $2"; cat "$folder/heard" "$folder/err"; exit 1
 }
 cd "$folder"
 NOTIFY_SOCKET=$folder/notify WATCHDOG_USEC=2000000 "$bin/$program" --config "$config" >"$folder/err" 2>&1 & pid=$!
 wait_for READY=1 1
 wait_for WATCHDOG=1 3
-kill -STOP $pid; sleep 0.3
+kill -STOP $pid; sleep 2
 before=$(heard WATCHDOG=1); sleep 2.5; after=$(heard WATCHDOG=1)
 [[ $before == "$after" ]] || { echo "a standing loop fed the watchdog"; exit 1; }
 kill -CONT $pid

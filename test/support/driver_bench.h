@@ -59,7 +59,7 @@ class Bench {
   }
   template <class Done>
   bool step_until(const Done& done) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!done()) {
       if (std::chrono::steady_clock::now() > end) return false;
       more = driver_.step(std::chrono::milliseconds(5));

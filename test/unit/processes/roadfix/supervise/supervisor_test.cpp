@@ -2,9 +2,11 @@
 
 #include <catch2/catch.hpp>
 #include <csignal>
+#include <filesystem>
 #include <thread>
 
 #include "config/config.h"
+#include "support/temporary_folder.h"
 
 namespace roadfix {
 namespace {
@@ -13,12 +15,12 @@ SupervisedProcess shell(const std::string& name, const std::string& script) {
   return {name, "sh", {"-c", script}, 0, true};
 }
 
-/// Steps until `done` or five seconds are over; true when done.
+/// Steps until `done` or a minute is over; true when done.
 template <class Done>
 bool step_until(Supervisor& supervisor, const Done& done) {
   const auto begin = std::chrono::steady_clock::now();
   while (!done()) {
-    if (std::chrono::steady_clock::now() - begin > std::chrono::seconds(5)) return false;
+    if (std::chrono::steady_clock::now() - begin > std::chrono::seconds(60)) return false;
     supervisor.step();
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
@@ -77,12 +79,13 @@ TEST_CASE("a program that is not there is said so") {
 }
 
 TEST_CASE("stop goes backwards through the starts and kills what does not listen") {
+  const test::TemporaryFolder folder;
+  const std::string set = (folder / "set").string();
   std::vector<std::string> lines;
-  Supervisor supervisor(
-      quick({shell("first", "sleep 60"), shell("deaf", "trap '' INT TERM; while :; do sleep 0.05; done")}), "/", "/",
-      [&](const std::string& l) { lines.push_back(l); });
-  REQUIRE(step_until(supervisor, [&] { return supervisor.running() == 2; }));
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // for the trap to be set
+  Supervisor supervisor(quick({shell("first", "sleep 60"),
+                               shell("deaf", "trap '' INT TERM; : > " + set + "; while :; do sleep 0.05; done")}),
+                        "/", "/", [&](const std::string& l) { lines.push_back(l); });
+  REQUIRE(step_until(supervisor, [&] { return supervisor.running() == 2 && std::filesystem::exists(set); }));
   supervisor.stop();
   CHECK(supervisor.running() == 0);
   CHECK(count(lines, "deaf was killed by signal 9") == 1);
