@@ -65,6 +65,7 @@ function(roadfix_process NAME)
   target_precompile_headers(roadfix_process_${NAME} REUSE_FROM roadfix_pch)
   add_executable(${NAME} main.cpp)
   target_link_libraries(${NAME} PRIVATE roadfix_process_${NAME} roadfix_build_id roadfix_options)
+  target_precompile_headers(${NAME} REUSE_FROM roadfix_pch)
   add_dependencies(roadfix_programs ${NAME})
 endfunction()
 
