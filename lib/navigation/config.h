@@ -6,6 +6,8 @@
 
 #include "geometry/se3.h"
 #include "inertial/imu_noise.h"
+#include "navigation/aiding/camera/camera_facts.h"
+#include "navigation/aiding/camera/camera_tuning.h"
 #include "vehicle/axle_speed.h"
 #include "vehicle/nonholonomic_noise.h"
 
@@ -29,6 +31,7 @@ struct VehicleFacts {
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero(), p_imu_antenna_std = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero(), p_imu_axle_std = Eigen::Vector3d::Zero();        ///< m
+  std::optional<CameraFacts> camera;
 };
 
 /// Latencies and clock offsets show only as differences, so one clock must define time: the better one by calibration,
@@ -112,6 +115,7 @@ struct NavigationTuning {
   vehicle::NonholonomicConfig nonholonomic;
   GnssScreenConfig screen;
   StartConfig start;
+  CameraTuning camera;
 };
 
 struct NavigationConfig : NavigationTuning {
@@ -187,6 +191,7 @@ void visit(NavigationTuning& c, Visitor& v) {
   v.group("nonholonomic", c.nonholonomic);
   v.group("screen", c.screen);
   v.group("start", c.start);
+  v.group("camera", c.camera);
 }
 
 }  // namespace roadfix::navigation

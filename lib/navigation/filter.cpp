@@ -10,6 +10,7 @@ namespace {
 
 // Rate and acceleration are smoothed over this time: long enough against vibration, short against a car's manoeuvres.
 constexpr double kMotionTime = 0.05;  // s
+constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
 
 double square(double x) { return x * x; }
 
@@ -23,6 +24,28 @@ void Filter::initialise(const Mean& mean, const BaseVector& std) {
   sums_ = inertial::TransitionSums();
   last_ = inertial::InertialStep();
   motion_ = BodyMotion();
+}
+
+void Filter::adopt(const Filter& other, const CameraFacts& camera) {
+  Mean mean;
+  mean.T_imu_camera = camera.T_imu_camera;
+  mean.T_left_right = camera.T_left_right;
+  mean.camera_offset = camera.offset;
+  BaseVector std = BaseVector::Zero();
+  std.segment<3>(kCameraTurn).setConstant(camera.turn_std);
+  std.segment<3>(kCameraPlace).setConstant(camera.place_std);
+  if (camera.right) {
+    std.segment<3>(kRightTurn).setConstant(camera.right_turn_std);
+  } else {
+    std.segment<3>(kLens) = Eigen::Vector3d(camera.focal_std, camera.radial_std, camera.radial4_std);
+  }
+  std(kCameraOffset) = camera.offset_std;
+  state_.adopt(other.state_, mean, std.cwiseAbs2());
+  earth_ = other.earth_;
+  sums_ = other.sums_;
+  last_ = other.last_;
+  motion_ = other.motion_;
+  gnss_bias_ = other.gnss_bias_;
 }
 
 void integrate(Mean& x, inertial::InertialStep& last, BodyMotion& motion, inertial::Earth& earth, const ImuSample& imu,
@@ -213,7 +236,11 @@ double Filter::longest_age(bool wheels) const {
         std::pair{kWheelLatency, x.wheel_latency}}) {
     if (at == kWheelLatency && !wheels) continue;
     const double variance = P(at, at) + P(kImuOffset, kImuOffset) - 2.0 * P(at, kImuOffset);
-    longest = std::max(longest, value - x.imu_offset + 3.0 * std::sqrt(std::max(variance, 0.0)));
+    longest = std::max(longest, value - x.imu_offset + kShownSigmas * std::sqrt(std::max(variance, 0.0)));
+  }
+  if (state_.has_camera()) {
+    const double sigma = std::sqrt(state_.P()(kCameraOffset, kCameraOffset));
+    longest = std::max(longest, kShownSigmas * sigma - x.camera_offset);
   }
   return longest;
 }

@@ -26,6 +26,9 @@ class Filter {
   /// Starts at `mean` with these standard deviations.
   void initialise(const Mean& mean, const BaseVector& std);
 
+  /// Goes on as `other`, which has no camera, with the camera as the calibration knows it.
+  void adopt(const Filter& other, const CameraFacts& camera);
+
   /// Moves mean and covariance over the `dt` s that end at imu.t_us, (N.2).
   void predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise);
   /// Moves the covariance to the state's epoch.

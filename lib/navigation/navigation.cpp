@@ -46,6 +46,7 @@ Navigation::Navigation(const NavigationConfig& config)
       imu_noise_(config.facts.imu),
       alignment_(config),
       lag_us_(lag_of(prior_age(config.facts))) {
+  if (config.sources.camera && config.facts.camera) camera_.emplace(config.camera, *config.facts.camera);
   records_.reserve(1024);
 }
 
@@ -101,6 +102,10 @@ void Navigation::add(const MagSample& mag, int64_t id) {
   if (!q) return;
   last_magnetic_us_ = mag.t_us;
   queue_.push(*q);
+}
+
+void Navigation::add(const TrackPicture& picture, int64_t id) {
+  if (camera_) camera_->add(picture, id);
 }
 
 void Navigation::note(AidingRecord record, int64_t id) {
@@ -190,8 +195,15 @@ void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) 
 
 void Navigation::end_alignment() {
   HeadingHypotheses& all = alignment_.hypotheses();
-  filter_.emplace(all.leader());
-  filter_->consider(0, 0);
+  if (camera_) {
+    filter_.emplace(config_, all.leader().earth(), true);
+    filter_->adopt(all.leader(), *config_.facts.camera);
+    camera_->restart();
+    camera_->skip_before(last_step_us_, filter_->state().x);
+  } else {
+    filter_.emplace(all.leader());
+    filter_->consider(0, 0);
+  }
   all.stop();
   phase_ = Phase::kDone;
   predictor_stale_ = true;
@@ -202,6 +214,7 @@ void Navigation::align_again() {
   if (usable()) abandoned_ = SE3{filter()->state().x.nav.q_level_imu, filter()->state().x.nav.position};
   phase_ = Phase::kWaiting;
   filter_.reset();
+  if (camera_) camera_->restart();
   predictor_.reset();
   alignment_.hypotheses().stop();
   alignment_.forget_place();
@@ -230,6 +243,16 @@ void Navigation::step_aligned(const ImuSample& imu, bool block_done) {
     note(aiding_.zero_motion().use_velocity(filter, true));
     note(aiding_.zero_motion().use_rate(filter, standstill_.block(), true));
   }
+  if (camera_) use_pictures(imu.t_us);
+}
+
+void Navigation::use_pictures(int64_t t_us) {
+  Filter& filter = *filter_;
+  camera_->skip_before(t_us - static_cast<int64_t>(1e6 * config_.process.max_gap), filter.state().x);
+  while (camera_->next_us(filter.state().x).value_or(INT64_MAX) <= t_us) {
+    const bool standing = aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen());
+    if (const auto record = camera_->use(filter, standing)) note(*record);
+  }
 }
 
 void Navigation::use(const Queued& q) {
@@ -238,7 +261,9 @@ void Navigation::use(const Queued& q) {
   note(r, q.id);
   if (q.kind != Queued::Kind::kPosition) return;
   if (r.status == AidingStatus::kAccepted) alignment_.fix_agreed();
-  if (r.status == AidingStatus::kReset) count_reset(before, filter_->state().x);
+  if (r.status != AidingStatus::kReset) return;
+  count_reset(before, filter_->state().x);
+  if (camera_) camera_->forget_poses(filter_->state());
 }
 
 void Navigation::count_reset(const SE3& before, const Mean& after) {
@@ -309,11 +334,12 @@ void Navigation::serialise(Archive& a) {
       a, anchor_, [] { return Geodetic(); }, [&](Geodetic& g) { a(g.latitude, g.longitude, g.height); });
   const inertial::Earth earth = anchor_ ? inertial::Earth(*anchor_) : inertial::Earth();
   serialise_optional(
-      a, filter_, [&] { return Filter(config_, earth, false); }, [&](Filter& f) { f.serialise(a); });
+      a, filter_, [&] { return Filter(config_, earth, camera_.has_value()); }, [&](Filter& f) { f.serialise(a); });
   serialise_optional(
       a, predictor_, [&] { return OutputPredictor(earth); }, [&](OutputPredictor& p) { p.serialise(a); });
   alignment_.serialise(a, anchor_);
   aiding_.serialise(a);
+  if (camera_) camera_->serialise(a);
   screen_.serialise(a);
   imu_noise_.serialise(a);
   standstill_.serialise(a);

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "navigation/aiding/aiding.h"
+#include "navigation/aiding/camera/camera_control.h"
 #include "navigation/aiding/gnss_screen.h"
 #include "navigation/initialisation/alignment.h"
 #include "navigation/output_predictor.h"
@@ -55,6 +56,7 @@ class Navigation {
   void add(const GnssFix& fix, int64_t id = 0);
   void add(const WheelSample& wheels, int64_t id = 0);
   void add(const MagSample& mag, int64_t id = 0);
+  void add(const TrackPicture& picture, int64_t id = 0);
 
   /// Nothing before the first fix.
   [[nodiscard]] std::optional<Geodetic> anchor() const { return anchor_; }
@@ -67,6 +69,8 @@ class Navigation {
   [[nodiscard]] NavigationStatus status() const;
   /// Filter in use (the leading hypothesis while aligning); nothing before alignment starts.
   [[nodiscard]] const Filter* filter() const;
+  /// Nothing where no camera is used.
+  [[nodiscard]] const CameraControl* camera() const { return camera_ ? &*camera_ : nullptr; }
   /// What was tried since the last call to clear_records().
   [[nodiscard]] const std::vector<AidingRecord>& records() const { return records_; }
   void clear_records() { records_.clear(); }
@@ -80,6 +84,7 @@ class Navigation {
   void step_aligned(const ImuSample& imu, bool block_done);
   void step_heading(const ImuSample& imu, double dt, bool block_done);
   void use(const Queued& q);
+  void use_pictures(int64_t t_us);
   void align_again();
   void end_alignment();
   void note(AidingRecord record, int64_t id = 0);
@@ -103,6 +108,7 @@ class Navigation {
   Alignment alignment_;
   std::optional<Geodetic> anchor_;
   std::optional<Filter> filter_;
+  std::optional<CameraControl> camera_;  ///< where there is one that is to be used
   std::optional<OutputPredictor> predictor_;
   Phase phase_ = Phase::kWaiting;
   bool predictor_stale_ = true;

@@ -110,6 +110,17 @@ void State::reset(const Mean& mean, const BaseVector& variance) {
   held_ = false;
 }
 
+void State::adopt(const State& other, const Mean& camera, const BaseVector& variance) {
+  Mean mean = other.x;
+  mean.T_imu_camera = camera.T_imu_camera;
+  mean.T_left_right = camera.T_left_right;
+  mean.lens = camera.lens;
+  mean.camera_offset = camera.camera_offset;
+  reset(mean, variance);
+  p_ref = other.p_ref;
+  P_.topLeftCorner<kWithoutCamera, kWithoutCamera>() = other.P_.topLeftCorner<kWithoutCamera, kWithoutCamera>();
+}
+
 void State::drop_clones() {
   clones.clear();
   points.clear();

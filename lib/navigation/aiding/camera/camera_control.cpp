@@ -23,7 +23,8 @@ CameraControl::CameraControl(const CameraTuning& tuning, const CameraFacts& fact
 }
 
 void CameraControl::add(const TrackPicture& picture, int64_t id) {
-  if (waiting_.size() >= kMostWaiting || picture.t_us <= stamps_.last_us()) return;
+  if (picture.t_us <= stamps_.last_us()) return;
+  if (waiting_.size() >= kMostWaiting) waiting_.pop_front();
   waiting_.push_back({stamps_.on_time(picture.t_us), id, picture});
 }
 
@@ -37,6 +38,15 @@ void CameraControl::restart() {
   fitness_ = CameraFitness::kOnTrial;
   misfit_ = trial_ = 0.0;
   pose_us_ = 0;
+}
+
+void CameraControl::skip_before(int64_t t_us, const Mean& x) {
+  while (next_us(x).value_or(INT64_MAX) < t_us) waiting_.pop_front();
+}
+
+void CameraControl::forget_poses(State& state) {
+  tracks_.clear();
+  state.drop_clones();
 }
 
 bool CameraControl::makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const {
@@ -83,7 +93,8 @@ void CameraControl::add_pose(Filter& filter, int64_t t_us) {
   State& state = filter.state();
   const Mean& x = state.x;
   state.move_reference(x.nav.position);
-  const Eigen::Vector3d rate = filter.motion().rate;
+  // Over the sample that the picture lies in: a smoothed rate would miss a hundredth of a radian of a rough road.
+  const Eigen::Vector3d rate = filter.last_step().rate - x.nav.q_level_imu.conjugate() * filter.earth().rate();
   state.add_clone(next_pose_++, rate, stamps_.jitter());
   pose_us_ = t_us;
   // From the imu's epoch to the picture's moment.

@@ -7,6 +7,7 @@
 
 #include <deque>
 
+#include "navigation/aiding/camera/camera_facts.h"
 #include "navigation/aiding/camera/camera_tuning.h"
 #include "navigation/aiding/camera/seen_picture.h"
 #include "navigation/aiding/camera/serialise_tracks.h"
@@ -17,14 +18,6 @@
 
 namespace roadfix::navigation {
 
-/// Of the calibration.
-struct CameraFacts {
-  CameraIntrinsics left;
-  std::optional<CameraIntrinsics> right;
-  double stamp_jitter = 0.0;  ///< s, by which single stamps are late
-  double rate = 0.0;          ///< Hz; zero: not known, and late stamps stay as they are
-};
-
 /// kOnTrial: tracks are tried and not used, until enough of them fit.
 enum class CameraFitness { kOnTrial, kFit, kUnfit };
 
@@ -32,16 +25,18 @@ class CameraControl {
  public:
   CameraControl(const CameraTuning& tuning, const CameraFacts& facts);
 
-  /// In the order of stamps; an older one, or one too many, is left out.
+  /// In the order of stamps; an older one is left out, and of too many the oldest.
   void add(const TrackPicture& picture, int64_t id = 0);
   /// When the next waiting picture was taken, the imu's clock.
   [[nodiscard]] std::optional<int64_t> next_us(const Mean& x) const;
   /// Uses it: `filter` stands at the imu's epoch at or after its moment. Nothing where no track was tried.
   std::optional<AidingRecord> use(Filter& filter, bool standing);
-  /// Drops it: there is no filter, or the filter is past it.
-  void skip() { waiting_.pop_front(); }
-  /// The filter began anew: poses and tracks are forgotten, what waits stays.
+  /// Drops what was taken before this time: the filter is past it.
+  void skip_before(int64_t t_us, const Mean& x);
+  /// The filter began anew: tracks are forgotten, what waits stays, and the camera is on trial again.
   void restart();
+  /// The filter jumped: tracks are forgotten, and its poses.
+  void forget_poses(State& state);
 
   [[nodiscard]] CameraFitness fitness() const { return fitness_; }
   /// Tracks in the newest picture that was used.

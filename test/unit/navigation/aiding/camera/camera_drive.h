@@ -24,6 +24,7 @@ struct CameraRun {
 struct CameraOutcome {
   Eigen::Matrix<double, 9, 1> error = Eigen::Matrix<double, 9, 1>::Zero();  ///< (phi, nu, rho) about the end
   Eigen::Matrix<double, 9, 9> cov = Eigen::Matrix<double, 9, 9>::Zero();
+  double lens_nees = 0.0;  ///< of the lens, which is exact
   int updates = 0, used = 0, refused = 0;
   double misfit = 0.0;
   navigation::CameraFitness fitness = navigation::CameraFitness::kOnTrial;
@@ -81,6 +82,7 @@ inline navigation::BaseVector start_std(const CameraRun& run, const navigation::
   std.segment<3>(kAccelBias).setConstant(facts.accel_bias_std);
   std.segment<3>(kGyroScale).setConstant(facts.scale_std);
   std.segment<3>(kAccelScale).setConstant(facts.scale_std);
+  if (!run.two_eyes) std.segment<3>(kLens) = Eigen::Vector3d(0.01, 0.02, 0.05);
   return std;
 }
 
@@ -139,6 +141,8 @@ inline CameraOutcome drive_by_camera(const TrackDrive& d, const CameraRun& run, 
   filter.state().move_reference(filter.state().x.nav.position);
   out.error = local(filter.state().x, true_mean(d, filter.state().x.t_us), filter.state().p_ref).head<9>();
   out.cov = filter.state().P().topLeftCorner<9, 9>();
+  const Eigen::Vector3d lens = filter.state().x.lens;
+  if (!run.two_eyes) out.lens_nees = lens.dot(filter.state().P().block<3, 3>(kLens, kLens).ldlt().solve(lens)) / 3.0;
   out.misfit /= std::max(1, out.used + out.refused);
   out.fitness = camera.fitness();
   return out;
