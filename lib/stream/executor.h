@@ -1,5 +1,5 @@
-/// How a process lends its threads to libraries. Results never depend on it: a job is waited for before its result is
-/// used, and each task of a loop writes its own part only.
+/// Interface by which a process lends its threads to libraries. Results do not depend on it: a job is awaited before
+/// its result is used, and each task of a loop writes only its own part.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@ class Executor {
   }
 };
 
-/// Everything at once, in the caller.
+/// Everything immediately, in the caller.
 class InlineExecutor final : public Executor {
  public:
   void start(std::function<void()> job) override { job(); }

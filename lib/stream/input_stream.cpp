@@ -8,7 +8,7 @@ namespace roadfix {
 
 namespace {
 
-/// What a silent clock may pile up before the oldest is given up.
+/// Inputs queued during a clock time-out before the oldest is given up.
 constexpr std::size_t kMaxWaiting = 50'000;
 constexpr std::size_t kMaxWaitingBytes = std::size_t{256} << 20;
 
@@ -21,35 +21,35 @@ InputStream::InputStream(std::vector<InputSpec> inputs, std::vector<ClockSpec> c
 
 void InputStream::allow_lateness(int64_t lateness_us) {
   const int64_t most_us = largest_lateness_us(inputs_);
-  lateness_us_ = std::clamp(lateness_us, std::min(kLeastLateness_us, most_us), most_us);
+  lateness_us_ = std::clamp(lateness_us, std::min(kMinLateness_us, most_us), most_us);
 }
 
 Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> bytes) {
   InputTrack& track = track_of(input);
   ++track.counters.received;
-  if (precedent_ != nullptr && !precedent_->accepts(input, id)) return Offer::kExcluded;
+  if (recorded_decisions_ != nullptr && !recorded_decisions_->accepts(input, id)) return Offer::kExcluded;
   if (resumes_at_ && id.utime <= *resumes_at_) {
     const InputSpec& spec = inputs_[static_cast<std::size_t>(input)];
-    if (id.utime + spec.effect_delay_us <= *horizon_) return Offer::kExcluded;  // the state holds it
+    if (id.utime + spec.effect_delay_us <= *horizon_) return Offer::kExcluded;  // contained in the state
     if (!waiting_.insert(id.utime + spec.effect_delay_us, input, id, bytes)) return Offer::kDuplicate;
     return resumed_tick(input, id) ? Offer::kTick : Offer::kWaits;
   }
-  if (const std::optional<Offer> turned_away = turn_away(input, id)) return *turned_away;
+  if (const std::optional<Offer> rejected = reject_known(input, id)) return *rejected;
   const int64_t effect_utime = id.utime + inputs_[static_cast<std::size_t>(input)].effect_delay_us;
   std::optional<bool> may_tick;
-  if (precedent_ != nullptr) {
-    may_tick =
-        precedent_->changes_clock(input, id) || (clock_.active_input() == input && !precedent_->clock_rests(id.utime));
+  if (recorded_decisions_ != nullptr) {
+    may_tick = recorded_decisions_->changes_clock(input, id) ||
+               (clock_.active_input() == input && !recorded_decisions_->clock_suspended(id.utime));
   }
   const std::optional<int64_t> last_utime = clock_.utime();
-  const ClockChoice::Verdict verdict = clock_.offer(input, id.utime, may_tick);
-  if (verdict == ClockChoice::Verdict::kRefused) return refuse(input, id, LedgerKind::kRefused);
+  const ClockSelector::Verdict verdict = clock_.offer(input, id.utime, may_tick);
+  if (verdict == ClockSelector::Verdict::kRefused) return refuse(input, id, LedgerKind::kRefused);
   if (!waiting_.insert(effect_utime, input, id, bytes)) {
     ++track.counters.duplicate;
     return Offer::kDuplicate;
   }
   note_newest(track, id.utime);
-  if (verdict == ClockChoice::Verdict::kTick) {
+  if (verdict == ClockSelector::Verdict::kTick) {
     tick(input, id, last_utime);
     return Offer::kTick;
   }
@@ -60,8 +60,8 @@ Offer InputStream::offer(int input, const EventId& id, std::span<const uint8_t> 
 Offer InputStream::skip(int input, const EventId& id) {
   InputTrack& track = track_of(input);
   ++track.counters.received;
-  if (precedent_ != nullptr) return Offer::kExcluded;
-  if (const std::optional<Offer> turned_away = turn_away(input, id)) return *turned_away;
+  if (recorded_decisions_ != nullptr) return Offer::kExcluded;
+  if (const std::optional<Offer> rejected = reject_known(input, id)) return *rejected;
   const int64_t effect_utime = id.utime + inputs_[static_cast<std::size_t>(input)].effect_delay_us;
   if (!waiting_.insert(effect_utime, input, id, {}, true)) {
     ++track.counters.duplicate;
@@ -74,24 +74,24 @@ Offer InputStream::skip(int input, const EventId& id) {
   return Offer::kSkipped;
 }
 
-/// One stamp ages ahead would make the channel look young for ever.
+/// A stamp far ahead must not affect the age of the channel.
 void InputStream::note_newest(InputTrack& track, int64_t utime) const {
-  if (clock_.utime() && utime - *clock_.utime() > ClockChoice::kLeap_us) return;
+  if (clock_.utime() && utime - *clock_.utime() > ClockSelector::kJump_us) return;
   track.newest_utime = std::max(track.newest_utime, utime);
 }
 
-/// What happens to a message that comes twice, too late, or from a publisher that another has replaced.
-std::optional<Offer> InputStream::turn_away(int input, const EventId& id) {
+/// Handles duplicates, late messages and messages of a replaced publisher.
+std::optional<Offer> InputStream::reject_known(int input, const EventId& id) {
   InputTrack& track = track_of(input);
-  switch (standing(input, id)) {
-    case Standing::kNew:
+  switch (disposition(input, id)) {
+    case Disposition::kNew:
       break;
-    case Standing::kDuplicate:
+    case Disposition::kDuplicate:
       ++track.counters.duplicate;
       return Offer::kDuplicate;
-    case Standing::kMissed:
+    case Disposition::kMissed:
       return refuse(input, id, LedgerKind::kLate);
-    case Standing::kConflict:
+    case Disposition::kConflict:
       ++track.counters.conflicts;
       return refuse(input, id, LedgerKind::kRefused);
   }
@@ -103,21 +103,21 @@ std::optional<Offer> InputStream::turn_away(int input, const EventId& id) {
   return std::nullopt;
 }
 
-/// A message may come twice, may have been given up as lost, or may belong to a publisher that another has replaced.
-InputStream::Standing InputStream::standing(int input, const EventId& id) const {
+/// Duplicate, given up as lost, or of a replaced publisher.
+InputStream::Disposition InputStream::disposition(int input, const EventId& id) const {
   const InputTrack& track = tracks_[static_cast<std::size_t>(input)];
-  if (!track.settled || id.run > track.settled->run) return Standing::kNew;
+  if (!track.settled || id.run > track.settled->run) return Disposition::kNew;
   if (id.run < track.settled->run) {
-    // Stragglers of the run before still count until the horizon has passed them; a second publisher's ticks do not.
-    return clock_.active_input() == input && id.utime > *clock_.utime() ? Standing::kConflict : Standing::kNew;
+    // Late messages of the previous run count until the horizon has passed them; ticks of a second publisher do not.
+    return clock_.active_input() == input && id.utime > *clock_.utime() ? Disposition::kConflict : Disposition::kNew;
   }
-  if (id.seq > track.settled->seq) return Standing::kNew;
-  if (track.is_missing(id.seq)) return Standing::kMissed;
-  return id.utime > track.newest_settled_utime ? Standing::kConflict : Standing::kDuplicate;
+  if (id.seq > track.settled->seq) return Disposition::kNew;
+  if (track.is_missing(id.seq)) return Disposition::kMissed;
+  return id.utime > track.newest_settled_utime ? Disposition::kConflict : Disposition::kDuplicate;
 }
 
-/// What comes before a late message and is not here would be late as well: it is given up now, not only when a later
-/// one is applied. What waits is here: its stamp may lie ahead of the late one's.
+/// Missing messages before a late one would be late as well: they are given up now. Waiting ones may have stamps ahead
+/// of it.
 void InputStream::settle_late(int input, const EventId& id) {
   InputTrack& track = track_of(input);
   if (!track.settled || track.settled->run != id.run) return;
@@ -128,7 +128,7 @@ void InputStream::settle_late(int input, const EventId& id) {
   track.newest_settled_utime = std::max(track.newest_settled_utime, id.utime);
 }
 
-/// What is missing between the last settled message of the run and this later one is lost.
+/// Messages missing between the last settled message of the run and this one are lost.
 void InputStream::settle_seq(int input, int64_t run, int64_t seq) {
   InputTrack& track = track_of(input);
   if (seq > track.settled->seq + 1) note_lost(input, run, track.settled->seq + 1, seq - 1);
@@ -146,7 +146,7 @@ Offer InputStream::refuse(int input, const EventId& id, LedgerKind kind) {
   return kind == LedgerKind::kRefused ? Offer::kRefused : Offer::kLate;
 }
 
-/// A change of clock is entered with the utime of the tick before it: between the two nothing ticked.
+/// A clock change is entered with the utime of the previous tick: nothing ticked in between.
 void InputStream::tick(int input, const EventId& id, std::optional<int64_t> last_utime) {
   if (clock_.changed()) {
     ledger_.note(LedgerKind::kClockChanged, input, id.run, id.seq, id.seq, last_utime.value_or(0));
@@ -159,7 +159,7 @@ void InputStream::tick(int input, const EventId& id, std::optional<int64_t> last
   resumes_at_.reset();
 }
 
-/// No older sample of the clock will be taken, so what is missing before this one and does not wait is lost.
+/// Older samples of the clock are refused from now on: missing ones that do not wait are lost.
 void InputStream::settle_tick(int input, const EventId& id) {
   const InputTrack& track = tracks_[static_cast<std::size_t>(input)];
   const bool same_run = track.settled && track.settled->run == id.run;
@@ -171,7 +171,7 @@ void InputStream::settle_tick(int input, const EventId& id) {
   settle(input, id);
 }
 
-/// Announces a new run, and what is missing between the last settled message and this one.
+/// Records a new run, and messages missing before this one.
 void InputStream::settle(int input, const EventId& id) {
   InputTrack& track = track_of(input);
   if (!track.settled || id.run > track.settled->run) {
@@ -205,7 +205,7 @@ const WaitingInput* InputStream::next() {
   return nullptr;
 }
 
-/// Two runs at once, or a seq that does not rise with utime: what the order of the data itself contradicts.
+/// Two runs at once, or a seq that decreases with utime: contradictions within the data.
 bool InputStream::admit(const WaitingInput& waiting) {
   InputTrack& track = track_of(waiting.input);
   const EventId& id = waiting.id;
@@ -241,7 +241,7 @@ void InputStream::limit_waiting() {
 }
 
 int64_t InputStream::ledger_total() const {
-  return precedent_ != nullptr ? precedent_->entries_at(*clock_.utime()) : ledger_.total();
+  return recorded_decisions_ != nullptr ? recorded_decisions_->entries_at(*clock_.utime()) : ledger_.total();
 }
 
 }  // namespace roadfix

@@ -1,11 +1,11 @@
-// How an InputStream is written into a snapshot and read from one.
+// Serialisation of an InputStream in snapshots.
 #include "stream/input_stream.h"
 
 namespace roadfix {
 
 namespace {
 
-/// A count read from a state: no more than what its bytes could hold.
+/// A count read from a state, limited by the remaining bytes.
 int64_t get_count(StateReader& reader, int64_t limit) {
   const auto count = reader.get<int64_t>();
   if (count < 0 || count > limit) throw std::runtime_error("state: impossible count " + std::to_string(count));
@@ -49,14 +49,14 @@ void get_track(StateReader& reader, InputTrack& track) {
 void InputStream::save(StateWriter& writer) const {
   writer.put(static_cast<int64_t>(inputs_.size()));
   for (const InputTrack& track : tracks_) put_track(writer, track);
-  const ClockChoice::State clock = clock_.state();
+  const ClockSelector::State clock = clock_.state();
   writer.put(static_cast<int64_t>(clock.active));
-  writer.put(static_cast<int8_t>(clock.rested));
+  writer.put(static_cast<int8_t>(clock.suspended));
   writer.put(clock.utime);
   writer.put(clock.first_utime);
   writer.put(static_cast<int64_t>(clock.newest_utime.size()));
   for (const std::optional<int64_t>& utime : clock.newest_utime) writer.put(utime);
-  for (const std::optional<int64_t>& utime : clock.leap_utime) writer.put(utime);
+  for (const std::optional<int64_t>& utime : clock.jump_utime) writer.put(utime);
   for (const std::optional<int64_t>& utime : clock.since_utime) writer.put(utime);
   writer.put(run_);
   writer.put(horizon_);
@@ -76,17 +76,17 @@ void InputStream::load(StateReader& reader) {
     throw std::runtime_error("state: of a stage with other inputs");
   }
   for (InputTrack& track : tracks_) get_track(reader, track);
-  ClockChoice::State clock;
+  ClockSelector::State clock;
   clock.active = static_cast<int>(get_count(reader, static_cast<int64_t>(inputs_.size())));
-  clock.rested = reader.get<int8_t>() != 0;
+  clock.suspended = reader.get<int8_t>() != 0;
   reader.get(clock.utime);
   reader.get(clock.first_utime);
   const auto clocks = static_cast<std::size_t>(get_count(reader, static_cast<int64_t>(inputs_.size())));
   clock.newest_utime.resize(clocks);
-  clock.leap_utime.resize(clocks);
+  clock.jump_utime.resize(clocks);
   clock.since_utime.resize(clocks);
   for (std::optional<int64_t>& utime : clock.newest_utime) reader.get(utime);
-  for (std::optional<int64_t>& utime : clock.leap_utime) reader.get(utime);
+  for (std::optional<int64_t>& utime : clock.jump_utime) reader.get(utime);
   for (std::optional<int64_t>& utime : clock.since_utime) reader.get(utime);
   clock_.restore(clock);
   reader.get(run_);

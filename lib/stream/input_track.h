@@ -1,4 +1,4 @@
-/// What a stream knows of one channel: which messages of its run were applied, which are settled, which were missed.
+/// Sequence state of one input channel: messages applied, settled and missed.
 #pragma once
 
 #include <cstdint>
@@ -22,14 +22,14 @@ struct InputCounters {
 
 class InputTrack {
  public:
-  /// Last message that the state holds.
+  /// Last message contained in the state.
   struct Applied {
     int64_t run = 0;
     int64_t seq = 0;
     int64_t utime = 0;
     int64_t count = 0;  ///< of this run
   };
-  /// Up to here every seq of the run was taken or given up.
+  /// All seqs of the run up to here were applied or given up.
   struct Settled {
     int64_t run = 0;
     int64_t seq = 0;
@@ -38,7 +38,7 @@ class InputTrack {
   std::optional<Applied> applied;
   std::optional<Settled> settled;
   int64_t newest_settled_utime = 0;
-  int64_t newest_utime = 0;  ///< of the messages that were in time, and not far ahead of it; 0 before the first
+  int64_t newest_utime = 0;  ///< of messages in time and not far ahead; 0 before the first
   InputCounters counters;
 
   void begin_run(int64_t run, int64_t first_seq) {
@@ -58,7 +58,7 @@ class InputTrack {
   [[nodiscard]] const std::deque<std::pair<int64_t, int64_t>>& missing() const { return missing_; }
 
  private:
-  /// Stragglers behind more gaps than this count as duplicates; nothing else depends on it.
+  /// Late messages behind more gaps than this count as duplicates, without other effect.
   static constexpr std::size_t kMaxMissing = 256;
   std::deque<std::pair<int64_t, int64_t>> missing_;
 };

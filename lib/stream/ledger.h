@@ -1,4 +1,4 @@
-/// The exceptions to "every input was applied" (docs/DESIGN.md, section 4). Inputs without an entry were taken.
+/// The exceptions to "every input was applied" (docs/DESIGN.md, section 4). Inputs without an entry were applied.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ enum class LedgerKind : int8_t {
 };
 
 struct LedgerEntry {
-  int64_t entry = 0;           ///< counts up from 1
-  int64_t at_clock_utime = 0;  ///< of the clock sample whose outputs are the first that count it
+  int64_t entry = 0;           ///< numbered from 1
+  int64_t at_clock_utime = 0;  ///< clock sample of the first outputs that count it
   LedgerKind kind = LedgerKind::kLost;
   int input = 0;
   int64_t run = 0;
@@ -30,14 +30,14 @@ struct LedgerEntry {
   int64_t utime = 0;  ///< of first_seq where known; of kClockChanged: of the tick before it
 };
 
-/// What happens between two clock samples is noted, and entered with the next: so the number of entries behind an
-/// output is a function of that output's utime.
+/// Events between two clock samples are noted and entered with the next one, so that the number of entries of an output
+/// is a function of its utime.
 class Ledger {
  public:
-  /// Joins onto the last note where it goes on from there.
+  /// Extends the last note where contiguous.
   void note(LedgerKind kind, int input, int64_t run, int64_t first_seq, int64_t last_seq, int64_t utime);
 
-  /// Gives the notes their numbers. Returns how many there were.
+  /// Numbers the notes. Returns their count.
   int64_t enter(int64_t clock_utime);
 
   [[nodiscard]] int64_t total() const { return total_; }

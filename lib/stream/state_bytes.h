@@ -1,5 +1,5 @@
-/// Serialised states: values in the order they were put, in the machine's own bytes (x86-64 and ARM64 agree).
-/// Reading past the end or leaving bytes over throws: a snapshot is taken whole or not at all.
+/// Serialised states: values in call order, in machine byte order (x86-64 and ARM64 agree). Reading past the end or
+/// leaving bytes unread throws.
 #pragma once
 
 #include <Eigen/Dense>
@@ -33,7 +33,7 @@ class StateWriter {
     put(value.has_value());
     put(value.value_or(T{}));
   }
-  /// Of a size that the reader knows.
+  /// Of a size known to the reader.
   template <class Derived>
   void put(const Eigen::PlainObjectBase<Derived>& matrix) {
     put_raw(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(typename Derived::Scalar));
@@ -107,7 +107,7 @@ class StateReader {
   std::span<const uint8_t> rest_;
 };
 
-/// Both as one kind of visitor, so that one list of members serves writing and reading: a(first, second, ...).
+/// Both as one kind of visitor, so that one member list serves writing and reading: a(first, second, ...).
 struct StateArchiveOut {
   static constexpr bool kReads = false;
   StateWriter out;

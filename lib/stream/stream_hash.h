@@ -1,4 +1,4 @@
-/// XXH64 of bytes that come bit by bit: what `xxhsum FILE` prints of a file that holds them.
+/// Incremental XXH64, equal to the output of `xxhsum FILE`.
 #pragma once
 
 #include <cstddef>

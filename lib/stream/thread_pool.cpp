@@ -21,7 +21,7 @@ struct ThreadPool::Impl {
   const std::function<void(int)>* task = nullptr;
   int count = 0;
   int busy = 0;                // workers in it
-  std::uint64_t loops = 0;     // begun so far
+  std::uint64_t loops = 0;     // started so far
   std::exception_ptr failure;  // the first one's
   bool ends = false;
   std::atomic<int> next{0};
@@ -43,7 +43,7 @@ struct ThreadPool::Impl {
       changed.wait(lock, [&] { return ends || loops != seen; });
       if (ends) return;
       seen = loops;
-      if (task == nullptr) continue;  // came too late: the others have done it
+      if (task == nullptr) continue;  // the others have finished the loop
       ++busy;
       const auto& f = *task;
       const int n = count;

@@ -1,4 +1,4 @@
-/// An executor with threads of its own; processes and tests make one and lend it.
+/// An executor with its own threads, created by processes and tests.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ class ThreadPool final : public Executor {
 
   void start(std::function<void()> job) override;
   void wait() override;
-  /// What a task throws is thrown here, the first one's, once all threads are at rest.
+  /// Rethrows the first exception of a task, once all threads are idle.
   void for_each(int count, const std::function<void(int)>& task) override;
 
  private:

@@ -7,7 +7,7 @@ namespace roadfix {
 
 namespace {
 
-/// Enough for one horizon of a fast sensor; what a silent clock piles up beyond it goes back to the allocator.
+/// Enough for one horizon of a fast sensor; memory beyond it is returned to the allocator.
 constexpr std::size_t kMaxFreeBuffers = 64;
 
 auto key(const WaitingInput& waiting) {
@@ -19,7 +19,7 @@ auto key(const WaitingInput& waiting) {
 bool WaitingQueue::insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes,
                           bool skipped) {
   WaitingInput waiting{effect_utime, input, id, {}, skipped};
-  auto place = queue_.end();  // most inputs belong at the end or close to it
+  auto place = queue_.end();  // most inputs belong at or near the end
   while (place != queue_.begin() && key(waiting) < key(*std::prev(place))) --place;
   if (place != queue_.begin() && key(*std::prev(place)) == key(waiting)) return false;
   if (!free_.empty()) {

@@ -1,4 +1,4 @@
-/// Inputs that wait for the horizon, in the order (effect utime, rank, run, seq). Buffers are used again.
+/// Inputs waiting for the horizon, in the order (effect utime, rank, run, seq). Buffers are reused.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,21 @@ struct WaitingInput {
   int input = 0;             ///< also its rank
   EventId id;
   std::vector<uint8_t> bytes;
-  bool skipped = false;  ///< holds its place in the sequence, and is not applied
+  bool skipped = false;  ///< keeps its place in the sequence, is not applied
 };
 
 class WaitingQueue {
  public:
-  /// False, and nothing changes, where the same message waits already.
+  /// Returns false, without change, for a message that is already waiting.
   bool insert(int64_t effect_utime, int input, const EventId& id, std::span<const uint8_t> bytes, bool skipped = false);
 
   [[nodiscard]] const WaitingInput* front() const { return queue_.empty() ? nullptr : &queue_.front(); }
 
-  /// Takes the front out; give it back with recycle().
+  /// Removes the front; return its buffer with recycle().
   WaitingInput pop();
   void recycle(WaitingInput&& used);
 
-  /// The seqs below `before` of one channel's run that wait, rising.
+  /// Seqs below `before` of one channel's run that are waiting, ascending.
   [[nodiscard]] std::vector<int64_t> seqs(int input, int64_t run, int64_t before) const;
 
   [[nodiscard]] std::size_t size() const { return queue_.size(); }

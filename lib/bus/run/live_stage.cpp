@@ -69,9 +69,9 @@ void LiveStage::take(int input, std::span<const uint8_t> bytes) {
 /// Whether the stamps have gone ahead, and not the time: after a silence as long as their leap the stage goes on.
 bool LiveStage::steps_ahead(int input, int64_t utime) {
   const InputStream& stream = runner_->stream();
-  if (!stream.confirms_leap(input, utime)) return false;
+  if (!stream.confirms_jump(input, utime)) return false;
   const int64_t silent_us = clock_.now_utime() - last_tick_us_;
-  return utime - *stream.clock_utime() - silent_us > ClockChoice::kLeap_us / 2;
+  return utime - *stream.clock_utime() - silent_us > ClockSelector::kJump_us / 2;
 }
 
 void LiveStage::remember_in(const std::filesystem::path& file) {
@@ -148,8 +148,8 @@ void LiveStage::begin_again(int64_t utime) {
   int64_t name = utime;
   while (runs_.contains(name)) ++name;
   runner_->name_run(name);
-  overload_ = OverloadChoice(runner_->spec().overload);
-  lateness_ = LatenessWatch(runner_->spec().inputs);
+  overload_ = OverloadSkipper(runner_->spec().overload);
+  lateness_ = LatenessEstimator(runner_->spec().inputs);
   horizon_run_.reset();
   step_back_.forget();
   began_because_ = std::string("the stamps went ") + (ahead_us > 0 ? "ahead" : "back") + " by " +

@@ -20,8 +20,8 @@
 #include "bus/run/stage_runner.h"
 #include "bus/run/step_back.h"
 #include "bus/run/unsent_watch.h"
-#include "stream/lateness_watch.h"
-#include "stream/overload_choice.h"
+#include "stream/lateness_estimator.h"
+#include "stream/overload_skipper.h"
 
 namespace roadfix {
 
@@ -66,8 +66,8 @@ class LiveStage : public MessageSink {
   ProcessLoad load_;
   std::function<std::unique_ptr<Stage>()> make_;
   std::unique_ptr<StageRunner> runner_;
-  OverloadChoice overload_;
-  LatenessWatch lateness_;
+  OverloadSkipper overload_;
+  LatenessEstimator lateness_;
   StepBack step_back_;
   std::optional<int64_t> horizon_run_;  ///< of our messages on HORIZON_<PROCESS>; none before the first clock sample
   int64_t horizon_seq_ = 0;

@@ -41,7 +41,7 @@ class StageRunner : private Outputs {
   [[nodiscard]] const Stage& stage() const { return *stage_; }
   [[nodiscard]] const InputStream& stream() const { return stream_; }
   /// Follows a recorded ledger instead of deciding by arrival. `precedent` must outlive the runner.
-  void follow(const Precedent* precedent) { stream_.follow(precedent); }
+  void replay_decisions(const RecordedDecisions* precedent) { stream_.replay_decisions(precedent); }
 
   /// Before the first offer(): the name of the run, where it is not to be the utime of its first tick.
   void name_run(int64_t run) { stream_.name_run(run); }

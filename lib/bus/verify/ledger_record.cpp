@@ -95,7 +95,7 @@ bool LedgerRecord::changes_clock(int input, const EventId& id) const {
   return clock_changes_.contains({input, id.run, id.seq});
 }
 
-bool LedgerRecord::clock_rests(int64_t utime) const {
+bool LedgerRecord::clock_suspended(int64_t utime) const {
   const auto after = rests_.lower_bound(utime);
   return after != rests_.begin() && utime <= std::prev(after)->second;
 }

@@ -13,7 +13,7 @@
 
 namespace roadfix {
 
-class LedgerRecord : public Precedent {
+class LedgerRecord : public RecordedDecisions {
  public:
   explicit LedgerRecord(const StageSpec& spec) : spec_(spec) {}
 
@@ -33,7 +33,7 @@ class LedgerRecord : public Precedent {
 
   [[nodiscard]] bool accepts(int input, const EventId& id) const override;
   [[nodiscard]] bool changes_clock(int input, const EventId& id) const override;
-  [[nodiscard]] bool clock_rests(int64_t utime) const override;
+  [[nodiscard]] bool clock_suspended(int64_t utime) const override;
   [[nodiscard]] int64_t entries_at(int64_t clock_utime) const override;
 
   /// Whether the ledger says that the stage never used this message.

@@ -114,7 +114,7 @@ int64_t RunVerifier::blind_from(const LogLoss& loss) const {
 /// False where the run cannot begin there; the reason is a finding.
 bool RunVerifier::begin(const Start& start) {
   runner_ = std::make_unique<StageRunner>(new_stage_(), *this);
-  runner_->follow(&run_.ledger);
+  runner_->replay_decisions(&run_.ledger);
   std::vector<std::pair<int, int64_t>> input_runs;
   runner_->name_run(name_);
   compared_from_ = start.utime();

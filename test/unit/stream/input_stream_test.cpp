@@ -70,7 +70,7 @@ TEST_CASE("inputs are applied when the horizon reaches them, in the order of uti
   REQUIRE(stream.run() == 0);
 }
 
-TEST_CASE("an input that the horizon has passed is late, and the ledger says so with the next tick") {
+TEST_CASE("an input behind the horizon is late and in the ledger with the next tick") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   REQUIRE(offer(stream, kSlow, 51, 1) == Offer::kWaits);
@@ -85,7 +85,7 @@ TEST_CASE("an input that the horizon has passed is late, and the ledger says so 
   REQUIRE(late[0].utime == 50);
 }
 
-TEST_CASE("a gap is a loss; what arrives after all is late, what came before is a duplicate") {
+TEST_CASE("a gap is a loss; a later arrival is late, an earlier one a duplicate") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   offer(stream, kSlow, 60, 1);
@@ -102,7 +102,7 @@ TEST_CASE("a gap is a loss; what arrives after all is late, what came before is 
   REQUIRE(stream.track(kSlow).counters.duplicate == 3);
 }
 
-TEST_CASE("stamps that ran ahead and come back late: what waits is not lost, and is applied") {
+TEST_CASE("stamps that ran ahead and return late: waiting inputs are not lost") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   offer(stream, kSlow, 60, 1);
@@ -123,7 +123,7 @@ TEST_CASE("stamps that ran ahead and come back late: what waits is not lost, and
   REQUIRE(stream.track(kSlow).counters.lost == 2);
 }
 
-TEST_CASE("a gap in the clock is a loss at once, and its stragglers are late") {
+TEST_CASE("a gap in the clock is a loss at once; late samples are late") {
   InputStream stream = make_stream();
   tick_until(stream, 50);
   REQUIRE(offer(stream, kClock, 80, 8) == Offer::kTick);
@@ -136,7 +136,7 @@ TEST_CASE("a gap in the clock is a loss at once, and its stragglers are late") {
   REQUIRE(stream.track(kClock).counters.lost == 2);  // not counted again when the horizon comes by
 }
 
-TEST_CASE("each run is announced; an older one that goes on beside it is refused") {
+TEST_CASE("each run is recorded; an older one that continues beside it is refused") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   offer(stream, kSlow, 60, 40, nullptr, 1);
@@ -167,14 +167,14 @@ TEST_CASE("two publishers on the clock: the newer run keeps it") {
   REQUIRE(stream.track(kClock).counters.conflicts == 1);
 }
 
-TEST_CASE("a looped log with shifted stamps is refused and said, not taken for duplicates") {
+TEST_CASE("a looped log with shifted stamps is refused and reported, not taken for duplicates") {
   InputStream stream = make_stream();
   tick_until(stream, 200);
   for (int64_t i = 0; i < 5; ++i) REQUIRE(offer(stream, kClock, 210 + 10 * i, i) == Offer::kRefused);
   REQUIRE(stream.track(kClock).counters.conflicts == 5);
 }
 
-TEST_CASE("feedback takes effect after its delay; later than that it goes unused to the ledger") {
+TEST_CASE("feedback takes effect after its delay; a later one is unused and in the ledger") {
   InputStream stream = make_stream();
   std::vector<Applied> applied;
   tick_until(stream, 50);
@@ -188,7 +188,7 @@ TEST_CASE("feedback takes effect after its delay; later than that it goes unused
   REQUIRE(entries(stream, LedgerKind::kUnusedFeedback).size() == 1);
 }
 
-TEST_CASE("what cannot be decoded goes to the ledger") {
+TEST_CASE("undecodable messages are in the ledger") {
   InputStream stream = make_stream();
   tick_until(stream, 50);
   stream.note_undecodable(kSlow, EventId{40, kRun, 9});
@@ -199,7 +199,7 @@ TEST_CASE("what cannot be decoded goes to the ledger") {
   REQUIRE(stream.track(kSlow).counters.undecodable == 2);
 }
 
-TEST_CASE("what is skipped under overload moves no clock, is not applied, and is no loss") {
+TEST_CASE("messages skipped under overload do not advance the clock, are not applied and are no loss") {
   InputStream stream = make_stream();
   std::vector<Applied> applied;
   tick_until(stream, 50);
@@ -220,7 +220,7 @@ TEST_CASE("what is skipped under overload moves no clock, is not applied, and is
   REQUIRE(stream.track(kSlow).counters.skipped == 1);
 }
 
-TEST_CASE("a silent clock does not fill the memory") {
+TEST_CASE("a clock time-out does not fill the memory") {
   InputStream stream = make_stream();
   for (int64_t i = 0; i < 60'000; ++i) offer(stream, kSlow, i, i);
   REQUIRE(stream.waiting().size() == 50'000);
@@ -283,7 +283,7 @@ TEST_CASE("200 orders of arrival within the lateness give the same, duplicates o
   REQUIRE_FALSE(run_arrivals(late) == expected);
 }
 
-TEST_CASE("a saved stream, loaded and given the inputs behind its horizon again, goes on as if never stopped") {
+TEST_CASE("a saved stream, restored and given the inputs behind its horizon, continues unchanged") {
   const std::vector<Arrival> list = arrivals(5, false);
   for (const std::size_t cut : {100U, 211U, 350U}) {
     InputStream whole = make_stream();
@@ -319,7 +319,7 @@ TEST_CASE("a saved stream, loaded and given the inputs behind its horizon again,
   }
 }
 
-TEST_CASE("a state that is cut or of other inputs is refused") {
+TEST_CASE("a truncated state or one of other inputs is refused") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   StateWriter writer;

@@ -4,7 +4,7 @@
 
 using namespace roadfix;
 
-TEST_CASE("entries get the next clock sample's time and rising numbers") {
+TEST_CASE("entries get the next clock sample's time and ascending numbers") {
   Ledger ledger;
   ledger.note(LedgerKind::kLost, 0, 1, 5, 6, 0);
   REQUIRE(ledger.total() == 0);
@@ -20,7 +20,7 @@ TEST_CASE("entries get the next clock sample's time and rising numbers") {
   CHECK(ledger.recent()[2].at_clock_utime == 300);
 }
 
-TEST_CASE("neighbouring seqs of one kind are one entry, but beginnings are not") {
+TEST_CASE("contiguous seqs of one kind are one entry, run starts are not") {
   Ledger ledger;
   ledger.note(LedgerKind::kLate, 0, 1, 5, 5, 50);
   ledger.note(LedgerKind::kLate, 0, 1, 6, 6, 60);
@@ -33,7 +33,7 @@ TEST_CASE("neighbouring seqs of one kind are one entry, but beginnings are not")
   CHECK(ledger.recent()[0].utime == 50);
 }
 
-TEST_CASE("entries are repeated for a minute of data, and never without bound") {
+TEST_CASE("entries are repeated for a minute of data, with a limit") {
   Ledger ledger;
   ledger.note(LedgerKind::kLost, 0, 1, 5, 5, 0);
   ledger.enter(1'000'000);

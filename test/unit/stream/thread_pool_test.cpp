@@ -20,7 +20,7 @@ TEST_CASE("a thread pool runs every task of a loop once, loop after loop") {
   }
 }
 
-TEST_CASE("what a task or a job throws reaches the caller, and the pool goes on") {
+TEST_CASE("an exception of a task or job reaches the caller, and the pool continues") {
   ThreadPool pool(3);
   const auto fails = [](int i) {
     if (i == 5) throw std::runtime_error("five");

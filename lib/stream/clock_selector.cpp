@@ -1,11 +1,11 @@
-#include "stream/clock_choice.h"
+#include "stream/clock_selector.h"
 
 #include <algorithm>
 
 namespace roadfix {
 
-/// Behind the last one where it is no clock.
-int ClockChoice::position_of(int input) const {
+/// Rank behind the last clock where it is none.
+int ClockSelector::position_of(int input) const {
   int position = 0;
   while (position < static_cast<int>(clocks_.size()) && clocks_[static_cast<std::size_t>(position)].input != input) {
     ++position;
@@ -13,10 +13,10 @@ int ClockChoice::position_of(int input) const {
   return position;
 }
 
-ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<bool> may_tick) {
+ClockSelector::Verdict ClockSelector::offer(int input, int64_t utime, std::optional<bool> may_tick) {
   const int position = position_of(input);
   if (position == static_cast<int>(clocks_.size())) return Verdict::kInput;
-  if (!may_tick && leaps(position, utime)) return Verdict::kRefused;
+  if (!may_tick && is_jump(position, utime)) return Verdict::kRefused;
   if (!first_utime_) first_utime_ = utime;
   std::optional<int64_t>& newest = newest_utime_[static_cast<std::size_t>(position)];
   if (!newest || utime > *newest) {
@@ -30,20 +30,20 @@ ClockChoice::Verdict ClockChoice::offer(int input, int64_t utime, std::optional<
   const bool preferred = active_ < 0 ? position == 0 : position <= active_;
   const bool takes = position == 0 || (position < active_) || may_take_over(position, utime);
   if (ahead && may_tick.value_or(takes)) {
-    changed_ = position != active_ || rested_;
-    rested_ = false;
+    changed_ = position != active_ || suspended_;
+    suspended_ = false;
     active_ = position;
     utime_ = utime;
     return Verdict::kTick;
   }
-  if (ahead && position == active_) rested_ = true;
+  if (ahead && position == active_) suspended_ = true;
   return preferred && !ahead ? Verdict::kRefused : Verdict::kInput;
 }
 
-bool ClockChoice::leaps(int position, int64_t utime) {
-  std::optional<int64_t>& last = leap_utime_[static_cast<std::size_t>(position)];
-  const bool far_ahead = utime_ && utime - *utime_ > kLeap_us;
-  if (far_ahead && !confirms_leap(clocks_[static_cast<std::size_t>(position)].input, utime)) {
+bool ClockSelector::is_jump(int position, int64_t utime) {
+  std::optional<int64_t>& last = jump_utime_[static_cast<std::size_t>(position)];
+  const bool far_ahead = utime_ && utime - *utime_ > kJump_us;
+  if (far_ahead && !confirms_jump(clocks_[static_cast<std::size_t>(position)].input, utime)) {
     last = utime;
     return true;
   }
@@ -51,17 +51,17 @@ bool ClockChoice::leaps(int position, int64_t utime) {
   return false;
 }
 
-bool ClockChoice::confirms_leap(int input, int64_t utime) const {
+bool ClockSelector::confirms_jump(int input, int64_t utime) const {
   const auto position = static_cast<std::size_t>(position_of(input));
-  if (position == clocks_.size() || !utime_ || utime - *utime_ <= kLeap_us) return false;
-  const std::optional<int64_t>& last = leap_utime_[position];
-  return last && utime > *last && utime - *last <= kLeap_us;
+  if (position == clocks_.size() || !utime_ || utime - *utime_ <= kJump_us) return false;
+  const std::optional<int64_t>& last = jump_utime_[position];
+  return last && utime > *last && utime - *last <= kJump_us;
 }
 
-/// An honest fallback is behind the preferred clock or just ahead of it, and comes more often than two thirds of the
-/// time-out: where it is past that, it has moved by a third of it. So the second condition changes nothing for it, in
-/// whichever order the two arrive.
-bool ClockChoice::may_take_over(int position, int64_t utime) const {
+/// A correctly stamped fallback is behind the preferred clock or just ahead of it, and has an interval below two thirds
+/// of the time-out: beyond the time-out it has advanced by a third of it. The second condition thus has no effect on
+/// it, in either order of arrival.
+bool ClockSelector::may_take_over(int position, int64_t utime) const {
   const std::optional<int64_t>& since = since_utime_[static_cast<std::size_t>(position)];
   for (std::size_t i = 0; i < static_cast<std::size_t>(position); ++i) {
     if (utime - newest_utime_[i].value_or(*first_utime_) <= clocks_[i].timeout_us) return false;
@@ -70,20 +70,20 @@ bool ClockChoice::may_take_over(int position, int64_t utime) const {
   return true;
 }
 
-std::optional<int> ClockChoice::active_input() const {
+std::optional<int> ClockSelector::active_input() const {
   if (active_ < 0) return std::nullopt;
   return clocks_[static_cast<std::size_t>(active_)].input;
 }
 
-void ClockChoice::restore(const State& state) {
+void ClockSelector::restore(const State& state) {
   active_ = state.active;
-  rested_ = state.rested;
+  suspended_ = state.suspended;
   utime_ = state.utime;
   first_utime_ = state.first_utime;
   newest_utime_ = state.newest_utime;
   newest_utime_.resize(clocks_.size());
-  leap_utime_ = state.leap_utime;
-  leap_utime_.resize(clocks_.size());
+  jump_utime_ = state.jump_utime;
+  jump_utime_.resize(clocks_.size());
   since_utime_ = state.since_utime;
   since_utime_.resize(clocks_.size());
   changed_ = false;

@@ -1,19 +1,19 @@
-#include "stream/clock_choice.h"
+#include "stream/clock_selector.h"
 
 #include <catch2/catch.hpp>
 
 using namespace roadfix;
-using Verdict = ClockChoice::Verdict;
+using Verdict = ClockSelector::Verdict;
 
 namespace {
 constexpr int kIns = 4;
 constexpr int kVo = 7;
 constexpr int kWheel = 2;
-ClockChoice three_clocks() { return ClockChoice({{kIns, 100}, {kVo, 200}, {kWheel, 300}}); }
+ClockSelector three_clocks() { return ClockSelector({{kIns, 100}, {kVo, 200}, {kWheel, 300}}); }
 }  // namespace
 
 TEST_CASE("the preferred clock ticks, the others are inputs, an older tick is refused") {
-  ClockChoice clock = three_clocks();
+  ClockSelector clock = three_clocks();
   REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
   REQUIRE(clock.changed());
   REQUIRE(clock.offer(kVo, 1050) == Verdict::kInput);
@@ -26,8 +26,8 @@ TEST_CASE("the preferred clock ticks, the others are inputs, an older tick is re
   REQUIRE(clock.utime() == 1010);
 }
 
-TEST_CASE("a silent clock is followed by the next after its time-out, and comes back at once") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("after its time-out a clock is replaced by the next, and returns at once") {
+  ClockSelector clock = three_clocks();
   clock.offer(kIns, 1000);
   clock.offer(kVo, 1050);
   REQUIRE(clock.offer(kVo, 1100) == Verdict::kInput);  // just at the time-out
@@ -41,8 +41,8 @@ TEST_CASE("a silent clock is followed by the next after its time-out, and comes 
   REQUIRE(clock.active_input() == kIns);
 }
 
-TEST_CASE("a clock that rested for one that did not come back goes on after the time-out, as a change") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("a clock suspended for one that did not return continues after the time-out, as a change") {
+  ClockSelector clock = three_clocks();
   clock.offer(kIns, 1000);
   clock.offer(kVo, 1060);
   clock.offer(kVo, 1101);
@@ -54,8 +54,8 @@ TEST_CASE("a clock that rested for one that did not come back goes on after the 
   REQUIRE_FALSE(clock.changed());
 }
 
-TEST_CASE("a fallback whose stamps run ahead makes no living clock silent") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("a fallback with stamps ahead causes no time-out of an active clock") {
+  ClockSelector clock = three_clocks();
   for (int64_t t = 1000; t < 3000; t += 10) {
     REQUIRE(clock.offer(kIns, t) == Verdict::kTick);
     if (t % 20 == 0) REQUIRE(clock.offer(kVo, t + (t < 1500 ? -30 : 400)) == Verdict::kInput);
@@ -64,10 +64,10 @@ TEST_CASE("a fallback whose stamps run ahead makes no living clock silent") {
   REQUIRE(clock.offer(kVo, 3440) == Verdict::kTick);  // once the other is silent: a third of its time-out from 3400 on
 }
 
-TEST_CASE("an honest fallback takes over at one and the same sample, however late it arrives") {
+TEST_CASE("a correctly stamped fallback takes over at the same sample, however late it arrives") {
   for (int64_t late = 0; late <= 50; late += 10) {
     CAPTURE(late);
-    ClockChoice clock = three_clocks();
+    ClockSelector clock = three_clocks();
     std::optional<int64_t> took_over;
     for (int64_t now = 1000; now < 1300; now += 10) {
       if (now <= 1100) REQUIRE(clock.offer(kIns, now) == Verdict::kTick);
@@ -78,8 +78,8 @@ TEST_CASE("an honest fallback takes over at one and the same sample, however lat
   }
 }
 
-TEST_CASE("the third clock waits for both before it") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("the third clock waits for the time-outs of both before it") {
+  ClockSelector clock = three_clocks();
   clock.offer(kIns, 1000);
   clock.offer(kVo, 1050);
   REQUIRE(clock.offer(kWheel, 1150) == Verdict::kInput);
@@ -87,19 +87,19 @@ TEST_CASE("the third clock waits for both before it") {
   REQUIRE(clock.offer(kWheel, 1251) == Verdict::kTick);
 }
 
-TEST_CASE("at the start the first clock has its time-out to appear in") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("at the start the first clock has its time-out to appear") {
+  ClockSelector clock = three_clocks();
   REQUIRE(clock.offer(kWheel, 1000) == Verdict::kInput);
   REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
 
-  ClockChoice without = three_clocks();
+  ClockSelector without = three_clocks();
   REQUIRE(without.offer(kVo, 1000) == Verdict::kInput);
   REQUIRE(without.offer(kVo, 1100) == Verdict::kInput);
   REQUIRE(without.offer(kVo, 1101) == Verdict::kTick);
 }
 
-TEST_CASE("what a record says replaces the time-outs") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("recorded decisions replace the time-outs") {
+  ClockSelector clock = three_clocks();
   REQUIRE(clock.offer(kIns, 900, false) == Verdict::kInput);
   REQUIRE(clock.offer(kIns, 1000, true) == Verdict::kTick);
   REQUIRE(clock.offer(kVo, 5000, false) == Verdict::kInput);
@@ -108,9 +108,9 @@ TEST_CASE("what a record says replaces the time-outs") {
   REQUIRE(clock.offer(kWheel, 1012, false) == Verdict::kInput);
 }
 
-TEST_CASE("a stamp far in the future is refused, and costs nothing but itself") {
-  const int64_t leap = ClockChoice::kLeap_us;
-  ClockChoice clock = three_clocks();
+TEST_CASE("a stamp far in the future is refused without side effects") {
+  const int64_t leap = ClockSelector::kJump_us;
+  ClockSelector clock = three_clocks();
   REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
   REQUIRE(clock.offer(kIns, 1000 + leap + 1) == Verdict::kRefused);
   REQUIRE(clock.offer(kIns, 1010) == Verdict::kTick);
@@ -120,31 +120,31 @@ TEST_CASE("a stamp far in the future is refused, and costs nothing but itself") 
   REQUIRE(clock.offer(kIns, 1120 + leap) == Verdict::kTick);
 }
 
-TEST_CASE("a gap longer than a leap is bridged by the second sample behind it") {
-  const int64_t leap = ClockChoice::kLeap_us;
-  ClockChoice clock = three_clocks();
+TEST_CASE("a gap longer than the jump limit is bridged by the second sample after it") {
+  const int64_t leap = ClockSelector::kJump_us;
+  ClockSelector clock = three_clocks();
   REQUIRE(clock.offer(kIns, 1000) == Verdict::kTick);
   REQUIRE(clock.offer(kIns, 1000 + 6 * leap) == Verdict::kRefused);
   REQUIRE(clock.offer(kIns, 1000 + 6 * leap) == Verdict::kRefused);  // the same again confirms nothing
   REQUIRE(clock.offer(kIns, 1000 + 9 * leap) == Verdict::kRefused);  // nor does another leap
-  ClockChoice restored = three_clocks();
+  ClockSelector restored = three_clocks();
   restored.restore(clock.state());
-  for (ClockChoice* c : {&clock, &restored}) {
+  for (ClockSelector* c : {&clock, &restored}) {
     REQUIRE(c->offer(kIns, 1010 + 9 * leap) == Verdict::kTick);
     REQUIRE(c->offer(kIns, 1020) == Verdict::kRefused);
   }
-  ClockChoice recorded = three_clocks();  // verify takes the ledger's word
+  ClockSelector recorded = three_clocks();  // verify takes the ledger's word
   REQUIRE(recorded.offer(kIns, 1000, true) == Verdict::kTick);
   REQUIRE(recorded.offer(kIns, 1010 + 9 * leap, true) == Verdict::kTick);
 }
 
-TEST_CASE("a restored choice goes on as the saved one") {
-  ClockChoice clock = three_clocks();
+TEST_CASE("a restored selector continues as the saved one") {
+  ClockSelector clock = three_clocks();
   clock.offer(kIns, 1000);
   clock.offer(kVo, 1060);
-  ClockChoice restored = three_clocks();
+  ClockSelector restored = three_clocks();
   restored.restore(clock.state());
-  for (ClockChoice* c : {&clock, &restored}) {
+  for (ClockSelector* c : {&clock, &restored}) {
     REQUIRE(c->offer(kVo, 1101) == Verdict::kTick);
     REQUIRE(c->offer(kIns, 1101) == Verdict::kRefused);
     REQUIRE(c->offer(kIns, 1102) == Verdict::kTick);

@@ -1,4 +1,4 @@
-#include "stream/lateness_watch.h"
+#include "stream/lateness_estimator.h"
 
 #include <catch2/catch.hpp>
 
@@ -9,12 +9,12 @@ namespace {
 constexpr int kVision = 1, kWheel = 2;  // inputs; 0 is the clock
 constexpr int64_t kMs = 1000;
 
-LatenessWatch some_watch() {
-  return LatenessWatch({{"CLOCK", "pose_t", 0}, {"VISION", "pose_t", 200 * kMs}, {"WHEEL", "pose_t", 50 * kMs}});
+LatenessEstimator some_watch() {
+  return LatenessEstimator({{"CLOCK", "pose_t", 0}, {"VISION", "pose_t", 200 * kMs}, {"WHEEL", "pose_t", 50 * kMs}});
 }
 
 /// Ten a second for `seconds`; all changes, in milliseconds.
-std::vector<int64_t> listen(LatenessWatch& watch, int64_t& clock_utime, double seconds, int64_t lateness_ms) {
+std::vector<int64_t> listen(LatenessEstimator& watch, int64_t& clock_utime, double seconds, int64_t lateness_ms) {
   std::vector<int64_t> changes;
   for (const int64_t end = clock_utime + static_cast<int64_t>(seconds * 1e6); clock_utime < end;
        clock_utime += 100 * kMs) {
@@ -27,16 +27,16 @@ std::vector<int64_t> listen(LatenessWatch& watch, int64_t& clock_utime, double s
 
 }  // namespace
 
-TEST_CASE("inputs that are punctual are not waited for beyond the least") {
-  LatenessWatch watch = some_watch();
+TEST_CASE("punctual inputs get the minimum lateness") {
+  LatenessEstimator watch = some_watch();
   int64_t now = 1'000'000'000;
   REQUIRE(watch.allowed_us() == 100 * kMs);
   REQUIRE(listen(watch, now, 60.0, 60).empty());
   REQUIRE(watch.allowed_us() == 100 * kMs);
 }
 
-TEST_CASE("later inputs get more at once, and give it back when twenty seconds did not need it") {
-  LatenessWatch watch = some_watch();
+TEST_CASE("a larger lateness takes effect at once and ends after twenty seconds without need") {
+  LatenessEstimator watch = some_watch();
   int64_t now = 1'000'000'000;
   listen(watch, now, 5.0, 60);
   REQUIRE(listen(watch, now, 0.2, 103) == std::vector<int64_t>{160});  // half as much again, to the next 10 ms
@@ -50,8 +50,8 @@ TEST_CASE("later inputs get more at once, and give it back when twenty seconds d
   REQUIRE(watch.allowed_us() == 100 * kMs);
 }
 
-TEST_CASE("one straggler is not waited for, nor what no horizon could wait for") {
-  LatenessWatch watch = some_watch();
+TEST_CASE("a single late message is not waited for, nor one beyond the specification") {
+  LatenessEstimator watch = some_watch();
   int64_t now = 1'000'000'000;
   listen(watch, now, 5.0, 60);
   watch.note(kVision, now, now - 180 * kMs);
@@ -61,8 +61,8 @@ TEST_CASE("one straggler is not waited for, nor what no horizon could wait for")
   REQUIRE(watch.change(now) == 200 * kMs);
 }
 
-TEST_CASE("channels that are all punctual by statement are not given more than stated") {
-  LatenessWatch watch({{"CLOCK", "pose_t", 0}, {"WHEEL", "pose_t", 50 * kMs}});
+TEST_CASE("channels specified as punctual get no more than specified") {
+  LatenessEstimator watch({{"CLOCK", "pose_t", 0}, {"WHEEL", "pose_t", 50 * kMs}});
   REQUIRE(watch.allowed_us() == 50 * kMs);
   for (int i = 0; i < 10; ++i) watch.note(1, 1'000'000, 1'000'000 - 50 * kMs);
   REQUIRE_FALSE(watch.change(1'000'000));
