@@ -47,7 +47,7 @@ struct ClockPriors {
   }
 };
 
-/// Which sources are used. The same library is Lee et al.'s (2025) EKF without camera or its MSCKF without GNSS by this list.
+/// Which sources are used. The same library is paper C's EKF without camera or its MSCKF without GNSS by this list.
 struct SourceList {
   bool gnss_position = true;
   bool gnss_velocity = true;
@@ -86,6 +86,8 @@ struct AidingConfig {
   double zero_rate_std = 2.0e-3;    ///< rad/s
   double magnetic_std = 0.1;        ///< rad
   double magnetic_interval = 1.0;   ///< s between two uses: its errors are correlated
+  bool lasting_errors = true;       ///< part of a GNSS error lasts: the Gauss-Markov states
+  bool step_detection = true;       ///< of wheel scale, receiver and gyro
 };
 
 /// What a fix must say about itself.
@@ -100,8 +102,8 @@ struct GnssScreenConfig {
 
 /// Start and validity.
 struct StartConfig {
-  int headings = 16;         ///< hypotheses around the circle
-  double heading_std = 0.2;  ///< rad, of each
+  int headings = 24;          ///< hypotheses around the circle
+  double heading_std = 0.15;  ///< rad, of each
   double confirm_probability = 0.999;
   double confirm_std = 0.052;      ///< rad
   double coasting_s = 3.0;         ///< s without position, velocity or standstill: coasting
@@ -161,6 +163,8 @@ void visit(AidingConfig& c, Visitor& v) {
   v.number("zero_rate_std_radps", c.zero_rate_std, 1e-6, 1.0);
   v.number("magnetic_std_rad", c.magnetic_std, 1e-3, 3.0);
   v.number("magnetic_interval_s", c.magnetic_interval, 0.0, 1000.0);
+  v.boolean("lasting_errors", c.lasting_errors);
+  v.boolean("step_detection", c.step_detection);
 }
 
 template <class Visitor>

@@ -24,6 +24,7 @@ void Filter::initialise(const Mean& mean, const BaseVector& std) {
   sums_ = inertial::TransitionSums();
   last_ = inertial::InertialStep();
   motion_ = BodyMotion();
+  steps_.stop();
 }
 
 void Filter::adopt(const Filter& other, const CameraFacts& camera) {
@@ -119,6 +120,7 @@ void Filter::flush() {
     step.Q = (move * step.Q * move.transpose()).eval();
     state_.p_ref = state_.x.nav.position;
   }
+  steps_.move(step.F, diagonal(T).decay);
   const int n = state_.size();
   Eigen::MatrixXd& P = state_.P();
   Eigen::Matrix<double, 9, Eigen::Dynamic, 0, 9, kMaxSize> rows(9, n);
@@ -173,7 +175,7 @@ AidingRecord Filter::judge(AidingSource source, int64_t t_us, const Measurement<
 }
 
 template <int Rows>
-void Filter::apply(const Measurement<Rows>& m) {
+void Filter::apply(const Measurement<Rows>& m, bool evidence) {
   const int n = state_.size();
   const Eigen::MatrixXd& P = state_.P();
   using Gain = Eigen::Matrix<double, Eigen::Dynamic, Rows, 0, kMaxSize, Rows>;
@@ -188,6 +190,7 @@ void Filter::apply(const Measurement<Rows>& m) {
     for (int k = 0; k < i; ++k) Y.col(i) -= innovation.L(i, k) * Y.col(k);
     Y.col(i) /= innovation.L(i, i);
   }
+  steps_.use<Rows>(m.H, innovation.L, innovation.whitened, Y, evidence);
   Eigen::VectorXd& d = scratch_;
   d.head(n) = Y.lazyProduct(innovation.whitened);
   if (considered_size_ == 0) {
@@ -206,8 +209,28 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
   const AidingRecord record = judge(source, t_us, m, gate);
   if (record.status != AidingStatus::kAccepted) return record;
   flush();
-  apply(m);
+  // Slow, a scale does not show, and the noise of speeds without a sign is rectified.
+  constexpr double kSlow = 2.0;  // m/s
+  apply(m, state_.x.nav.velocity.squaredNorm() > kSlow * kSlow);
   return record;
+}
+
+std::optional<StepDetector::Step> Filter::mend_step(double sigmas) {
+  const std::optional<StepDetector::Step> step = steps_.most_likely(sigmas);
+  if (!step) {
+    steps_.advance(state_.x.t_us);
+    return std::nullopt;
+  }
+  flush();
+  scratch_.setZero();
+  scratch_.head<kWithoutCamera>() = step->size * step->per_unit;
+  state_.retract(scratch_);
+  state_.P().topLeftCorner<kWithoutCamera, kWithoutCamera>() +=
+      (step->variance * step->per_unit * step->per_unit.transpose()).eval();
+  for (int j = 1; j < kWithoutCamera; ++j)
+    for (int i = 0; i < j; ++i) state_.P()(i, j) = state_.P()(j, i);
+  steps_.begin();
+  return step;
 }
 
 void Filter::reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vector3d& std) {

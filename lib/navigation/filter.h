@@ -6,6 +6,7 @@
 #include "inertial/strapdown.h"
 #include "navigation/config.h"
 #include "navigation/measurement.h"
+#include "navigation/step_detector.h"
 
 namespace roadfix::navigation {
 
@@ -58,6 +59,12 @@ class Filter {
   /// P += d d' over the base block.
   void widen(const BaseVector& d);
 
+  /// Watches for steps from now on, (N.5.8).
+  void watch_for_steps() { steps_.begin(); }
+  [[nodiscard]] StepDetector& steps() { return steps_; }
+  /// A step that explains the innovations better than chance does at this many sigmas is taken back.
+  std::optional<StepDetector::Step> mend_step(double sigmas);
+
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] State& state() { return state_; }
   [[nodiscard]] const BodyMotion& motion() const { return motion_; }
@@ -77,6 +84,7 @@ class Filter {
     state_.serialise(a);
     sums_.serialise(a);
     last_.serialise(a);
+    steps_.serialise(a);
     a(motion_.rate, motion_.acceleration, considered_first_, considered_size_, gnss_bias_.position_std,
       gnss_bias_.velocity_std, gnss_bias_.position_time, gnss_bias_.velocity_time);
   }
@@ -92,7 +100,7 @@ class Filter {
   template <int Rows>
   [[nodiscard]] Eigen::Matrix<double, Rows, Rows> innovation_covariance(const Measurement<Rows>& m) const;
   template <int Rows>
-  void apply(const Measurement<Rows>& m);
+  void apply(const Measurement<Rows>& m, bool evidence);
 
   NavigationConfig config_;
   inertial::Earth earth_;
@@ -102,6 +110,7 @@ class Filter {
   BodyMotion motion_;
   int considered_first_ = 0, considered_size_ = 0;
   GnssBias gnss_bias_;
+  StepDetector steps_;
   Eigen::VectorXd scratch_;  // a correction
 };
 

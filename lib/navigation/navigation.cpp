@@ -204,6 +204,7 @@ void Navigation::end_alignment() {
     filter_.emplace(all.leader());
     filter_->consider(0, 0);
   }
+  if (config_.aiding.step_detection) filter_->watch_for_steps();
   all.stop();
   phase_ = Phase::kDone;
   predictor_stale_ = true;
@@ -233,6 +234,7 @@ void Navigation::step_aligned(const ImuSample& imu, bool block_done) {
                     use(q);
                   });
   if (wheels) wheels_at_us_ = imu.t_us;
+  mend_steps();
   // Where wheel speeds come, the constraint joins them: one epoch of updates instead of two.
   if (wheels || seconds_between(wheels_at_us_, imu.t_us) > kWheelsSilent) {
     const bool learn = seconds_between(used_at_us_[0], imu.t_us) < kTruthShown;
@@ -251,8 +253,19 @@ void Navigation::use_pictures(int64_t t_us) {
   camera_->skip_before(t_us - static_cast<int64_t>(1e6 * config_.process.max_gap), filter.state().x);
   while (camera_->next_us(filter.state().x).value_or(INT64_MAX) <= t_us) {
     const bool standing = aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen());
-    if (const auto record = camera_->use(filter, standing)) note(*record);
+    const std::optional<AidingRecord> record = camera_->use(filter, standing);
+    if (!record) continue;
+    note(*record);
+    // The detector carries no columns of poses, so what it has carried ends with an update by them.
+    if (record->status == AidingStatus::kAccepted && filter.steps().watches()) filter.steps().begin();
   }
+}
+
+/// A step that explains the innovations is taken back, (N.5.10).
+void Navigation::mend_steps() {
+  if (!config_.aiding.step_detection || !filter_->mend_step(config_.aiding.gate_sigma)) return;
+  ++steps_;
+  predictor_stale_ = true;
 }
 
 void Navigation::use(const Queued& q) {
@@ -349,7 +362,7 @@ void Navigation::serialise(Archive& a) {
       a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
   a(phase_, predictor_stale_, lag_us_, last_step_us_, last_wheel_us_, wheels_at_us_, last_magnetic_us_, last_fix_us_,
     last_fix_.latitude, last_fix_.longitude, last_fix_.height, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
-    bad_imu_, gaps_);
+    bad_imu_, gaps_, steps_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

@@ -36,7 +36,7 @@ struct NavigationStatus {
   int64_t bad_imu_samples = 0;
   bool imu_frozen = false;
   int64_t imu_gaps = 0;
-  int64_t wheel_scale_steps = 0;  ///< after which the scale was estimated anew
+  int64_t wheel_scale_steps = 0;  ///< of wheels, receiver or gyro, that were detected and taken back
 };
 
 struct NavigationOutput {
@@ -85,6 +85,7 @@ class Navigation {
   void step_heading(const ImuSample& imu, double dt, bool block_done);
   void use(const Queued& q);
   void use_pictures(int64_t t_us);
+  void mend_steps();
   void align_again();
   void end_alignment();
   void note(AidingRecord record, int64_t id = 0);
@@ -119,7 +120,7 @@ class Navigation {
   std::optional<SE3> abandoned_;  // last pose of a filter that was given up
   int reset_counter_ = 0;
   SE3 reset_delta_;
-  int64_t bad_imu_ = 0, gaps_ = 0;
+  int64_t bad_imu_ = 0, gaps_ = 0, steps_ = 0;
   std::vector<AidingRecord> records_;
 };
 

@@ -74,7 +74,7 @@ NavigationStatus Navigation::status() const {
   if (s.gnss_reason.empty() && aiding_.gnss_position().height_differs()) s.gnss_reason = kHeightContradicts;
   s.bad_imu_samples = bad_imu_;
   s.imu_gaps = gaps_;
-  s.wheel_scale_steps = aiding_.wheel_speed().scale_steps();
+  s.wheel_scale_steps = steps_ + aiding_.wheel_speed().scale_steps();
   s.imu_frozen = imu_noise_.frozen();
   for (size_t i = 0; i < kAidingSources; ++i)
     if (used_at_us_[i] != 0 && seconds_between(used_at_us_[i], last_step_us_) <= config_.start.coasting_s)

@@ -201,6 +201,7 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
 }
 
 std::unique_ptr<Stage> make_gnss_ins_ekf(const Calibration& calibration, const GnssInsProcessConfig& config) {
+  if (config.filter == InsFilter::kNavigation) return make_navigation_stage(calibration, config);
   return std::make_unique<GnssInsStage>(calibration, config);
 }
 

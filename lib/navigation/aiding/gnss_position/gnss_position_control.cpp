@@ -10,25 +10,21 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr double kOutage = 3.0;  // s without a position, after which its errors are new
-
-/// Share of a fix's variance that lasts, and for how long: a fixed carrier phase leaves multipath of centimetres, code
-/// errors last seconds to a minute (Misra and Enge, Global Positioning System, 2006, ch. 5).
-struct ErrorShape {
-  double lasting_share;
-  double time;  // s
-};
-ErrorShape shape_of(FixType type) {
-  if (type == FixType::kRtkFixed) return {0.1, 30.0};
-  return {0.8, 30.0};
-}
-
-// m: how far off a receiver may come back from an outage without a fixed phase, level and up; and how far a displaced
-// one typically is.
+constexpr double kErrorTime =
+    20.0;  // s: multipath and code smoothing last seconds to a minute (Misra and Enge 2006, ch. 5)
+// Share of a fix's variance that lasts, before innovations have shown it, and its bounds.
+constexpr double kCodeShare = 0.7, kPhaseShare = 0.05;
+constexpr double kLeastShare = 0.02, kMostShare = 0.95;
+constexpr double kShareGain = 0.01;   // per fix, of the correlation of successive innovations (Mehra 1970)
+constexpr double kMostProduct = 4.0;  // of two whitened innovations: outliers count no more
+// m: how far off a receiver without a fixed phase may come back from an outage, level and up; how far off a displaced one
+// typically is.
 constexpr double kReturnLevel = 3.0, kReturnUp = 6.0;
 constexpr double kDisplacement = 5.0;
 constexpr double kDisplacedPrior = 0.01;               // of a run of rejected fixes
 constexpr double kTailFreedom = 3.0;                   // Student's t: errors of filters and receivers have heavy tails
 constexpr int kRunForFilter = 2, kRunForReceiver = 3;  // rejected fixes that agree, to decide
+constexpr double kAlikeShare = 0.2;                    // of their size, by which fixes of a run may differ
 
 /// Student's t in two dimensions, without its constant.
 double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
@@ -38,61 +34,105 @@ double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
 
 }  // namespace
 
-Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queued& fix) const {
-  const double white = (1.0 - shape_of(fix.fix_type).lasting_share) * scale(fix.fix_type);
-  return gnss_position(filter.state(), filter.motion(), fix.value, white * fix.cov, fix.ahead(filter.state().x));
+GnssPositionControl::GnssPositionControl(const NavigationConfig& config)
+    : config_(config), gates_(config.aiding.gate_sigma) {
+  for (Receiver& r : receivers_) r.lasting_share = config.aiding.lasting_errors ? kCodeShare : 0.0;
+  if (config.aiding.lasting_errors) receivers_[static_cast<size_t>(FixType::kRtkFixed)].lasting_share = kPhaseShare;
 }
 
 Eigen::Vector3d GnssPositionControl::lasting_std(const GnssFix& fix) const {
-  return (shape_of(fix.fix_type).lasting_share * scale(fix.fix_type) * fix.cov_enu.diagonal()).cwiseSqrt();
+  const Receiver& r = receiver(fix.fix_type);
+  return (r.lasting_share * r.scale.variance_factor() * fix.cov_enu.diagonal()).cwiseSqrt();
 }
 
-void GnssPositionControl::begin(Filter& filter, const Queued& fix) const {
-  const ErrorShape shape = shape_of(fix.fix_type);
-  const Eigen::Vector3d std = (shape.lasting_share * scale(fix.fix_type) * fix.cov.diagonal()).cwiseSqrt();
-  filter.gnss_bias().position_std = std;
-  filter.gnss_bias().position_time = shape.time;
+GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const {
+  const Receiver& r = receiver(fix.fix_type);
+  Bias bias;
+  bias.stationary_std = (r.lasting_share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
+  bias.std = bias.stationary_std;
   const bool returns = tried_at_us_ != 0 && seconds_between(tried_at_us_, fix.t_us) > kOutage;
-  if (tried_at_us_ != 0 && !returns && fix.fix_type == last_type_) return;
-  const Eigen::Vector3d displaced = returns && fix.fix_type != FixType::kRtkFixed
-                                        ? Eigen::Vector3d(kReturnLevel, kReturnLevel, kReturnUp)
-                                        : Eigen::Vector3d::Zero();
-  filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), (std.cwiseAbs2() + displaced.cwiseAbs2()).cwiseSqrt());
+  bias.anew = tried_at_us_ == 0 || returns || fix.fix_type != last_type_;
+  if (returns && fix.fix_type != FixType::kRtkFixed && config_.aiding.lasting_errors)
+    bias.std = (bias.std.cwiseAbs2() + Eigen::Vector3d(kReturnLevel, kReturnLevel, kReturnUp).cwiseAbs2()).cwiseSqrt();
+  return bias;
+}
+
+/// Where b begins anew it is part of the noise, so that a rejected fix leaves the filter as it was.
+Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queued& fix, const Bias& bias) const {
+  const Receiver& r = receiver(fix.fix_type);
+  const double white = (1.0 - r.lasting_share) * r.scale.variance_factor();
+  Measurement<3> m =
+      gnss_position(filter.state(), filter.motion(), fix.value, white * fix.cov, fix.ahead(filter.state().x));
+  if (!bias.anew) return m;
+  m.residual += filter.state().x.gnss_bias;
+  m.H.middleCols<3>(kGnssBias).setZero();
+  m.R.diagonal() += bias.std.cwiseAbs2();
+  return m;
+}
+
+void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
+  filter.gnss_bias().position_std = bias.stationary_std;
+  filter.gnss_bias().position_time = kErrorTime;
+  if (bias.anew) filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
 }
 
 AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) const {
-  begin(filter, fix);
-  return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix), Gates::open().nis[3]);
+  Bias bias = bias_of(fix);
+  set_bias(filter, bias);
+  bias.anew = false;
+  return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
 
 AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
-  begin(filter, fix);
-  tried_at_us_ = fix.t_us;
-  last_type_ = fix.fix_type;
-  AidingRecord r = filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix), gates_.nis[3]);
-  if (r.status == AidingStatus::kGated) {
-    const AidingRecord level = use_level(filter, fix);
-    r = level.status == AidingStatus::kAccepted ? level : decide(filter, fix, r);
-  } else if (r.status == AidingStatus::kAccepted) {
-    scale_[static_cast<size_t>(fix.fix_type)].learn(r);
+  Bias bias = bias_of(fix);
+  AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
+  if (r.status == AidingStatus::kAccepted) {
+    set_bias(filter, bias);
+    bias.anew = false;
+    (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
+    learn(fix, r);
     height_differs_ = false;
+  } else if (r.status == AidingStatus::kGated) {
+    const AidingRecord level = use_level(filter, fix, bias);
+    r = level.status == AidingStatus::kAccepted ? level : decide(filter, fix, bias, r);
   }
   if (r.status == AidingStatus::kAccepted || r.status == AidingStatus::kReset) {
+    tried(fix);
     used_at_us_ = fix.t_us;
     rejected_ = 0;
   }
   return r;
 }
 
+/// (N.5.3), (N.5.4): scale by the size of innovations, share of what lasts by their correlation.
+void GnssPositionControl::learn(const Queued& fix, const AidingRecord& r) {
+  Receiver& seen = receivers_[static_cast<size_t>(fix.fix_type)];
+  seen.scale.learn(r);
+  if (!config_.aiding.lasting_errors) return;
+  const Eigen::Vector2d whitened(r.innovation[0] / std::sqrt(r.innovation_variance[0]),
+                                 r.innovation[1] / std::sqrt(r.innovation_variance[1]));
+  const double product = std::clamp(0.5 * whitened.dot(seen.last_whitened), -kMostProduct, kMostProduct);
+  seen.lasting_share = std::clamp(seen.lasting_share + kShareGain * product, kLeastShare, kMostShare);
+  seen.last_whitened = whitened;
+}
+
 /// The height alone contradicts: it becomes an error of the receiver's height, which fades as its errors do.
-AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix) {
-  const Measurement<3> all = measurement(filter, fix);
-  Measurement<2> level;
-  level.residual = all.residual.head<2>();
-  level.H = all.H.topRows<2>();
-  level.R = all.R.topLeftCorner<2, 2>();
-  const AidingRecord r = filter.fuse(AidingSource::kGnssPosition, fix.t_us, level, gates_.nis[2]);
+AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix, const Bias& bias) {
+  const auto level_of = [](const Measurement<3>& all) {
+    Measurement<2> level;
+    level.residual = all.residual.head<2>();
+    level.H = all.H.topRows<2>();
+    level.R = all.R.topLeftCorner<2, 2>();
+    return level;
+  };
+  const AidingRecord r =
+      filter.judge(AidingSource::kGnssPosition, fix.t_us, level_of(measurement(filter, fix, bias)), gates_.nis[2]);
   if (r.status != AidingStatus::kAccepted) return r;
+  set_bias(filter, bias);
+  Bias now = bias;
+  now.anew = false;
+  const Measurement<3> all = measurement(filter, fix, now);
+  (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, level_of(all), Gates::open().nis[2]);
   height_differs_ = true;
   BaseVector wider = BaseVector::Zero();
   wider(kGnssBias + 2) = all.residual(2);
@@ -100,71 +140,78 @@ AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix) {
   return r;
 }
 
-/// (N.5.5): displaced receiver or wrong filter?
-AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, const AidingRecord& rejected) {
+/// A displaced receiver that comes back: what b holds is over.
+AidingRecord GnssPositionControl::take_undisplaced(Filter& filter, const Queued& fix, const Bias& bias) {
+  Bias none = bias;
+  none.anew = true;
+  none.std = none.stationary_std;
+  AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), gates_.nis[3]);
+  if (r.status != AidingStatus::kAccepted) return r;
+  set_bias(filter, none);
+  none.anew = false;
+  displaced_ = false;
+  return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), Gates::open().nis[3]);
+}
+
+/// (N.5.5): an outlier, a displaced receiver or a wrong filter?
+AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, const Bias& bias,
+                                         const AidingRecord& rejected) {
   AidingRecord r = rejected;
-  const Measurement<3> m = measurement(filter, fix);
-  const Eigen::Vector3d off = m.residual;
-  // What b holds may be over: a displaced receiver comes back.
   if (displaced_) {
-    Filter undisplaced = filter;
-    undisplaced.reset_block(kGnssBias, Eigen::Vector3d::Zero(), filter.gnss_bias().position_std);
-    const Measurement<3> again = measurement(undisplaced, fix);
-    const AidingRecord tried = undisplaced.fuse(AidingSource::kGnssPosition, fix.t_us, again, gates_.nis[3]);
-    if (tried.status == AidingStatus::kAccepted) {
-      filter = undisplaced;
-      displaced_ = false;
-      return tried;
-    }
+    const AidingRecord back = take_undisplaced(filter, fix, bias);
+    if (back.status == AidingStatus::kAccepted) return back;
   }
-  const double gate = std::sqrt(gates_.nis[2]);
-  const double alike = gate * std::sqrt(2.0 * (m.R(0, 0) + m.R(1, 1))) + 0.2 * off.head<2>().norm();
-  if (rejected_ == 0 || (off - first_off_).head<2>().norm() > alike) {
+  const Measurement<3> m = measurement(filter, fix, bias);
+  const Eigen::Vector3d off = m.residual;
+  const double noise = std::sqrt(2.0 * gates_.nis[2] * (m.R(0, 0) + m.R(1, 1)));
+  const double apart = (off - first_off_).head<2>().norm();
+  if (rejected_ == 0 || apart > noise + kAlikeShare * off.head<2>().norm()) {
     rejected_ = 1;
     first_off_ = off;
     return r;
   }
   ++rejected_;
-  const Eigen::Matrix2d S(
-      (Eigen::Matrix2d() << rejected.innovation_variance[0], 0.0, 0.0, rejected.innovation_variance[1]).finished());
+  const Eigen::Matrix2d S =
+      Eigen::Vector2d(rejected.innovation_variance[0], rejected.innovation_variance[1]).asDiagonal();
   const double wrong_filter = log_tail(off.head<2>(), S);
   const double displaced = std::log(kDisplacedPrior) +
                            log_tail(off.head<2>(), kDisplacement * kDisplacement * Eigen::Matrix2d::Identity() + S);
-  if (wrong_filter >= displaced) {
-    if (rejected_ < kRunForFilter) return r;
+  const bool filter_is_wrong = wrong_filter >= displaced;
+  if (rejected_ < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
+  set_bias(filter, bias);
+  Bias now = bias;
+  now.anew = false;
+  displaced_ = !filter_is_wrong;
+  if (filter_is_wrong) {
     widen_filter(filter, fix, off);
-    r = filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix), Gates::open().nis[3]);
-    r.status = AidingStatus::kReset;
-    displaced_ = false;
-    return r;
+  } else {
+    BaseVector wider = BaseVector::Zero();
+    wider.segment<3>(kGnssBias) = off;
+    filter.widen(wider);
   }
-  if (rejected_ < kRunForReceiver) return r;
-  BaseVector wider = BaseVector::Zero();
-  wider.segment<3>(kGnssBias) = off;
-  filter.widen(wider);
-  displaced_ = true;
-  return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix), gates_.nis[3]);
+  r = filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, now), Gates::open().nis[3]);
+  if (filter_is_wrong) r.status = AidingStatus::kReset;
+  return r;
 }
 
-/// (N.5.6): position by what the fixes differ, velocity by what made that since a fix was last used, attitude and
-/// biases by their spread.
+/// (N.5.6): position by what the fixes differ, velocity by what made that since a fix was last used, attitude and biases
+/// by their spread.
 void GnssPositionControl::widen_filter(Filter& filter, const Queued& fix, const Eigen::Vector3d& off) const {
-  const double since = std::max(1.0, seconds_between(used_at_us_, fix.t_us));
   constexpr double kTilt = 0.01, kHeading = 0.05;  // rad
+  const double since = std::max(1.0, seconds_between(used_at_us_, fix.t_us));
   const VehicleFacts& v = config_.facts;
-  const auto by = [&](int at, const Eigen::Vector3d& d) {
+  const auto widen = [&](int at, const Eigen::Vector3d& d) {
     BaseVector wider = BaseVector::Zero();
     wider.segment<3>(at) = d;
     filter.widen(wider);
   };
-  by(kPos, off);
+  widen(kPos, off);
   for (int i = 0; i < 3; ++i) {
-    Eigen::Vector3d axis = Eigen::Vector3d::Zero();
-    axis(i) = 1.0;
-    by(kVel, (off.norm() / since) * axis);
-    by(kAtt, (i == 2 ? kHeading : kTilt) * axis);
-    by(kGyroBias, v.gyro_bias_std * axis);
-    by(kAccelBias, v.accel_bias_std * axis);
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(i);
+    widen(kVel, (off.norm() / since) * axis);
+    widen(kAtt, (i == 2 ? kHeading : kTilt) * axis);
+    widen(kGyroBias, v.gyro_bias_std * axis);
+    widen(kAccelBias, v.accel_bias_std * axis);
   }
 }
 

@@ -1,8 +1,9 @@
 /// When and with what noise a GNSS position is used: the one error model of a receiver, (N.5) of MODEL.md.
 ///
-/// A position is h + b + n: n white with an adaptive scale, b a Gauss-Markov state. What the gate rejects is a single
-/// outlier, a displaced receiver or a wrong filter; runs of rejected fixes that agree with each other are decided by
-/// the likelihoods of the last two under heavy-tailed priors: b or the filter is widened by what they differ.
+/// A position is h + b + n: n white with an adaptive scale, b a Gauss-Markov state whose share of the variance follows
+/// from the whiteness of innovations. What the gate rejects is a single outlier, a displaced receiver or a wrong filter:
+/// runs of rejected fixes that agree with each other are decided by the likelihoods of the last two under heavy-tailed
+/// priors, and b or the filter is widened by what they differ.
 #pragma once
 
 #include <array>
@@ -15,15 +16,12 @@ namespace roadfix::navigation {
 
 class GnssPositionControl {
  public:
-  explicit GnssPositionControl(const NavigationConfig& config) : config_(config), gates_(config.aiding.gate_sigma) {}
+  explicit GnssPositionControl(const NavigationConfig& config);
 
   /// `status` kReset: the filter was found wrong and took the fix.
   AidingRecord use(Filter& filter, const Queued& fix);
   /// For a hypothesis of the start: no gate, no learning.
   AidingRecord try_on(Filter& filter, const Queued& fix) const;
-  /// Prepares a filter for fixes of this type: stationary sigma of its bias, and the bias itself for the first one.
-  void begin(Filter& filter, const Queued& fix) const;
-
   /// A fix was tried on the hypotheses of a start.
   void tried(const Queued& fix) {
     tried_at_us_ = fix.t_us;
@@ -32,7 +30,6 @@ class GnssPositionControl {
   /// m, of the Gauss-Markov error in a fix, level axes.
   [[nodiscard]] Eigen::Vector3d lasting_std(const GnssFix& fix) const;
 
-  [[nodiscard]] int rejected() const { return rejected_; }  ///< in a row
   [[nodiscard]] bool displaced() const { return displaced_; }
   [[nodiscard]] bool height_differs() const { return height_differs_; }
   /// The filter has lost its past (a gap, a new start): nothing holds against the receiver.
@@ -40,24 +37,43 @@ class GnssPositionControl {
 
   template <class Archive>
   void serialise(Archive& a) {
-    for (NoiseScale& s : scale_) s.serialise(a);
+    for (Receiver& r : receivers_) {
+      r.scale.serialise(a);
+      a(r.lasting_share, r.last_whitened);
+    }
     a(used_at_us_, tried_at_us_, last_type_, rejected_, first_off_, displaced_, height_differs_);
   }
 
  private:
-  [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix) const;
-  [[nodiscard]] double scale(FixType type) const { return scale_[static_cast<size_t>(type)].variance_factor(); }
-  AidingRecord use_level(Filter& filter, const Queued& fix);
-  AidingRecord decide(Filter& filter, const Queued& fix, const AidingRecord& rejected);
+  /// What fixes of one type have shown.
+  struct Receiver {
+    NoiseScale scale;
+    double lasting_share = 0.0;
+    Eigen::Vector2d last_whitened = Eigen::Vector2d::Zero();
+  };
+  /// What of the receiver's Gauss-Markov error a fix begins with.
+  struct Bias {
+    bool anew = false;  ///< another type, or a return from an outage: what b holds is over
+    Eigen::Vector3d stationary_std, std;
+  };
+
+  [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
+  [[nodiscard]] Bias bias_of(const Queued& fix) const;
+  [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
+  static void set_bias(Filter& filter, const Bias& bias);
+  AidingRecord use_level(Filter& filter, const Queued& fix, const Bias& bias);
+  AidingRecord decide(Filter& filter, const Queued& fix, const Bias& bias, const AidingRecord& rejected);
+  AidingRecord take_undisplaced(Filter& filter, const Queued& fix, const Bias& bias);
   void widen_filter(Filter& filter, const Queued& fix, const Eigen::Vector3d& off) const;
+  void learn(const Queued& fix, const AidingRecord& r);
 
   NavigationConfig config_;
   Gates gates_;
-  std::array<NoiseScale, 6> scale_;  // by FixType
+  std::array<Receiver, 6> receivers_;  // by FixType
   int64_t used_at_us_ = 0, tried_at_us_ = 0;
   FixType last_type_ = FixType::kNone;
-  int rejected_ = 0;
-  Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();  // innovation of the first of a run of rejected fixes
+  int rejected_ = 0;                                     // in a row, that agree with each other
+  Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();  // innovation of the first of them
   bool displaced_ = false, height_differs_ = false;
 };
 

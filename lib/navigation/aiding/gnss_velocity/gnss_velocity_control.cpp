@@ -14,17 +14,19 @@ constexpr int kPersistent = 8;         // rejected in a row: more than a cluster
 }  // namespace
 
 AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, double gate) const {
-  const double factor = scale_.variance_factor();
+  const double share = lasting_ ? kLastingShare : 0.0, factor = scale_.variance_factor();
   const Eigen::Vector3d lag = kSmoothing * filter.motion().acceleration;
-  filter.gnss_bias().velocity_time = kErrorTime;
-  filter.gnss_bias().velocity_std = (factor * (kLastingShare * velocity.cov.diagonal() + lag.cwiseAbs2())).cwiseSqrt();
   Measurement<3> m = gnss_velocity(filter.state(), filter.motion(), velocity.value,
-                                   factor * (1.0 - kLastingShare) * velocity.cov, velocity.ahead(filter.state().x));
+                                   factor * (1.0 - share) * velocity.cov, velocity.ahead(filter.state().x));
   // A smoothed velocity looks like an antenna elsewhere: the antenna's place is noise here, and not estimated.
   const Eigen::Matrix3d by_antenna = m.H.middleCols<3>(kAntenna);
   m.R += by_antenna * filter.state().P().block<3, 3>(kAntenna, kAntenna) * by_antenna.transpose();
   m.H.middleCols<3>(kAntenna).setZero();
-  return filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
+  const AidingRecord r = filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
+  if (r.status != AidingStatus::kAccepted || !lasting_) return r;
+  filter.gnss_bias().velocity_time = kErrorTime;
+  filter.gnss_bias().velocity_std = (factor * (share * velocity.cov.diagonal() + lag.cwiseAbs2())).cwiseSqrt();
+  return r;
 }
 
 AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {

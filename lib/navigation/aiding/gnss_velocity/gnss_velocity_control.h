@@ -10,7 +10,8 @@ namespace roadfix::navigation {
 
 class GnssVelocityControl {
  public:
-  explicit GnssVelocityControl(const NavigationConfig& config) : gates_(config.aiding.gate_sigma) {}
+  explicit GnssVelocityControl(const NavigationConfig& config)
+      : lasting_(config.aiding.lasting_errors), gates_(config.aiding.gate_sigma) {}
 
   AidingRecord use(Filter& filter, const Queued& velocity);
   AidingRecord try_on(Filter& filter, const Queued& velocity) const;
@@ -24,6 +25,7 @@ class GnssVelocityControl {
  private:
   AidingRecord fuse(Filter& filter, const Queued& velocity, double gate) const;
 
+  bool lasting_;
   Gates gates_;
   NoiseScale scale_;
   int rejected_ = 0;

@@ -38,9 +38,9 @@ AidingRecord WheelSpeedControl::use(Filter& filter, const Queued& wheels) {
   const std::optional<Measurement<1>> m = measurement(filter, wheels);
   if (!m) return record_of(AidingSource::kWheelSpeed, AidingStatus::kNotReady, wheels.t_us);
   const AidingRecord r = filter.fuse(AidingSource::kWheelSpeed, wheels.t_us, *m, gates_.nis[1]);
-  if (r.status == AidingStatus::kGated)
+  if (r.status == AidingStatus::kGated && detects_steps_)
     widen_scale(filter, wheels, r);
-  else
+  else if (r.status == AidingStatus::kAccepted)
     rejected_ = 0;
   return r;
 }

@@ -8,7 +8,8 @@ namespace roadfix::navigation {
 
 class WheelSpeedControl {
  public:
-  explicit WheelSpeedControl(const NavigationConfig& config) : gates_(config.aiding.gate_sigma) {}
+  explicit WheelSpeedControl(const NavigationConfig& config)
+      : detects_steps_(config.aiding.step_detection), gates_(config.aiding.gate_sigma) {}
 
   AidingRecord use(Filter& filter, const Queued& wheels);
   AidingRecord try_on(Filter& filter, const Queued& wheels) const;
@@ -22,6 +23,7 @@ class WheelSpeedControl {
  private:
   void widen_scale(Filter& filter, const Queued& wheels, const AidingRecord& r);
 
+  bool detects_steps_;
   Gates gates_;
   int64_t rejected_since_us_ = 0;
   double excess_sum_ = 0.0, excess_least_ = 0.0, excess_most_ = 0.0;  // relative, of rejected speeds in a row

@@ -1,0 +1,105 @@
+#include "gnss_ins_ekf/navigation_messages.h"
+
+#include <cmath>
+
+#include "bus/sample_codec.h"
+#include "geometry/frames.h"
+
+namespace roadfix {
+
+namespace {
+
+void copy(const Eigen::Vector3d& from, double (&to)[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = from(i);
+}
+
+double std_of(const Eigen::MatrixXd& P, int i) { return std::sqrt(P(i, i)); }
+
+void fill_estimates(const navigation::Filter& filter, const navigation::VehicleFacts& vehicle, ins_status_t& m) {
+  using namespace navigation;
+  const Mean& x = filter.state().x;
+  const Eigen::MatrixXd& P = filter.state().P();
+  copy(x.gyro_bias, m.gyro_bias_radps);
+  copy(x.accel_bias, m.accel_bias_mps2);
+  for (int i = 0; i < 3; ++i) {
+    m.gyro_bias_std_radps[i] = std_of(P, kGyroBias + i);
+    m.accel_bias_std_mps2[i] = std_of(P, kAccelBias + i);
+  }
+  m.wheel_scale = 1.0 / (1.0 + x.wheel_scale);
+  m.wheel_scale_std = std_of(P, kWheelScale);
+  copy(Eigen::Vector3d(0.0, x.mounting.x(), x.mounting.y()), m.mounting_rad);
+  m.mounting_std_rad[0] = vehicle.mounting_std.x();
+  m.mounting_std_rad[1] = std_of(P, kMounting);
+  m.mounting_std_rad[2] = std_of(P, kMounting + 1);
+  m.gnss_position_latency_s = x.position_latency;
+  m.gnss_position_latency_std_s = std_of(P, kPositionLatency);
+  m.gnss_velocity_latency_s = x.velocity_latency;
+  m.gnss_velocity_latency_std_s = std_of(P, kVelocityLatency);
+  m.imu_time_offset_s = x.imu_offset;
+  m.imu_time_offset_std_s = std_of(P, kImuOffset);
+  m.wheel_latency_s = x.wheel_latency;
+  m.wheel_latency_std_s = std_of(P, kWheelLatency);
+}
+
+int8_t pose_state(const navigation::NavigationOutput& output) {
+  if (output.odometry.validity == Validity::kValid) return pose_t::STATE_RUNNING;
+  if (output.odometry.validity == Validity::kCoasting) return pose_t::STATE_WEAK;
+  if (output.phase == navigation::Phase::kDone) return pose_t::STATE_LOST;
+  return output.phase == navigation::Phase::kWaiting ? pose_t::STATE_WAITING : pose_t::STATE_ALIGNING;
+}
+
+}  // namespace
+
+void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose) {
+  fill_pose(output.odometry, pose);
+  pose.frame = pose_t::FRAME_ENU;
+  if (anchor) {
+    pose.anchor_lat_deg = anchor->latitude / kDegree;
+    pose.anchor_lon_deg = anchor->longitude / kDegree;
+    pose.anchor_height_m = anchor->height;
+  }
+  pose.origin = pose_t::ORIGIN_IMU;
+  pose.scale = pose_t::SCALE_METRIC;
+  pose.state = pose_state(output);
+  pose.reason = output.reason;
+  pose.reset_counter = output.reset_counter;
+  copy(output.reset_delta.p, pose.reset_delta_m);
+  pose.reset_delta_q_wxyz[0] = output.reset_delta.q.w();
+  pose.reset_delta_q_wxyz[1] = output.reset_delta.q.x();
+  pose.reset_delta_q_wxyz[2] = output.reset_delta.q.y();
+  pose.reset_delta_q_wxyz[3] = output.reset_delta.q.z();
+}
+
+ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,
+                        const navigation::VehicleFacts& vehicle) {
+  ins_status_t m{};
+  m.alignment = static_cast<int8_t>(status.phase);
+  m.waits_for = status.waits_for;
+  m.heading_confirmed = status.phase == navigation::Phase::kDone;
+  m.aided_by = status.aided_by;
+  m.coasting = status.coasting;
+  m.coasting_since_utime = status.coasting_since_us;
+  m.gnss_quality = static_cast<int8_t>(status.gnss_quality);
+  m.gnss_reason = status.gnss_reason;
+  m.wheel_scale = 1.0;
+  m.wheel_scale_steps = status.wheel_scale_steps;
+  if (filter != nullptr) fill_estimates(*filter, vehicle, m);
+  return m;
+}
+
+aiding_t aiding(const navigation::AidingRecord& record) {
+  aiding_t m{};
+  m.measurement_utime = record.t_us;
+  m.measurement_seq = record.id;
+  m.source = static_cast<int8_t>(record.source);
+  m.status = static_cast<int8_t>(record.status);
+  m.nis = record.nis;
+  m.dof = record.dof;
+  const auto n = static_cast<size_t>(record.dof);
+  m.innovation.assign(record.innovation.begin(), record.innovation.begin() + static_cast<ptrdiff_t>(n));
+  m.innovation_variance.assign(record.innovation_variance.begin(),
+                               record.innovation_variance.begin() + static_cast<ptrdiff_t>(n));
+  return m;
+}
+
+}  // namespace roadfix

@@ -1,0 +1,17 @@
+/// Messages of the GNSS/INS process from lib/navigation: units and enums, nothing else.
+#pragma once
+
+#include <roadfix/aiding_t.hpp>
+#include <roadfix/ins_status_t.hpp>
+#include <roadfix/pose_t.hpp>
+
+#include "navigation/navigation.h"
+
+namespace roadfix {
+
+void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose);
+ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,
+                        const navigation::VehicleFacts& vehicle);
+aiding_t aiding(const navigation::AidingRecord& record);
+
+}  // namespace roadfix
