@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "roadfix/common_options.h"
 #include "roadfix/console.h"
 #include "roadfix/import/drive_log.h"
+#include "roadfix/import/ros_choice.h"
 #include "roadfix/import/source.h"
 #include "roadfix/vehicle_defaults.h"
 
@@ -28,6 +30,7 @@ struct Options {
   double score_skip = 0.0;
   std::filesystem::path times;
   std::filesystem::path reference;
+  std::vector<std::string> topics;
 };
 
 /// What was asked for, from the flags that were given.
@@ -39,6 +42,16 @@ void collect(const CLI::App& command, Options& options) {
   if (command.count("--score-skip") > 0) options.changes.score_skip = options.score_skip;
   if (command.count("--times") > 0) options.read.times = options.times;
   if (command.count("--reference") > 0) options.read.reference = options.reference;
+  for (const std::string& topic : options.topics) {
+    const std::size_t equal = topic.find('=');
+    const std::string role = topic.substr(0, equal);
+    const auto& roles = ros_roles();
+    if (equal == std::string::npos || std::find(roles.begin(), roles.end(), role) == roles.end()) {
+      throw std::runtime_error(
+          fmt::format("--topic {}: must be ROLE=/TOPIC, ROLE one of {}", topic, fmt::join(roles, ", ")));
+    }
+    options.read.topics[role] = topic.substr(equal + 1);
+  }
 }
 
 void run(Options& options) {
@@ -52,7 +65,11 @@ void run(Options& options) {
     throw std::runtime_error("--sequence, --times and --reference are for poses; this source is of format " +
                              options.read.format);
   }
+  if (!options.read.topics.empty() && options.read.format != "rosbag") {
+    throw std::runtime_error("--topic is for ROS bags; this source is of format " + options.read.format);
+  }
   Drive drive = read_source(options.source, options.read);
+  for (const std::string& remark : drive.remarks) std::cout << "  " << remark << "\n";
   const std::string name = drive.description.name;
   if (!options.vehicle.empty()) {
     write_vehicle(drive.description.calibration, name, options.vehicle, options.out.overwrite);
@@ -108,11 +125,13 @@ void add_gnss_flags(CLI::App& command, Options& options) {
 void add_import_command(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("import", "Make a drive log and a vehicle configuration from a recording");
-  command->add_option("source", options->source, "a folder, or a file of poses")->required();
+  command->add_option("source", options->source, "a folder, a ROS bag, or a file of poses")->required();
   add_output(*command, options->out, "the log to write");
   command->add_option("--vehicle", options->vehicle,
                       "folder for calibration.yaml and one file of defaults per process");
-  command->add_option("--format", options->read.format, "folder, kitti, euroc or poses (default: what it looks like)")
+  command
+      ->add_option("--format", options->read.format,
+                   "folder, kitti, euroc, rosbag or poses (default: what it looks like)")
       ->check(CLI::IsMember(source_formats()));
   command->add_option("--without", options->changes.without, "sensors to leave out, with commas between")
       ->delimiter(',')
@@ -124,6 +143,7 @@ void add_import_command(CLI::App& app) {
   command->add_option("--sequence", options->read.sequence, "poses: which one of the folder's sequences");
   command->add_option("--times", options->times, "poses: file of frame times");
   command->add_option("--reference", options->reference, "poses: file of true poses");
+  command->add_option("--topic", options->topics, "ROS bags: ROLE=/TOPIC, for example imu=/x/imu; may be given again");
   add_progress(*command, options->progress);
   add_gnss_flags(*command, *options);
   command->callback([command, options] {

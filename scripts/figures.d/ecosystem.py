@@ -96,4 +96,20 @@ def mcap_mb_s(runs):
     return size / 1e6 / (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
-MEASUREMENTS = {"python_mb_s": python_mb_s, "mcap_read": mcap_read, "mcap_mb_s": mcap_mb_s}
+def rosbag_values(runs):
+    """The demo drive's sensor messages to ROS 1 (plain and bz2), rosbag2 sqlite3 and MCAP bags and back in by import."""
+    test_support(runs)
+    import ros_bags
+    folder = runs.folder("rosbag")
+    stream, expected = ros_bags.messages(runs.root, runs.root / "logs" / "demo.lcm")
+    equal, total = 0, 0
+    for bag in ros_bags.write_all(folder, stream).values():
+        log = folder / "back.lcm"
+        log.unlink(missing_ok=True)
+        runs.roadfix("import", bag, "--out", log)
+        one, every = ros_bags.equal_values(expected, ros_bags.found_in(runs.root, log))
+        equal, total = equal + one, total + every
+    return equal / total
+
+
+MEASUREMENTS = {"python_mb_s": python_mb_s, "mcap_read": mcap_read, "mcap_mb_s": mcap_mb_s, "rosbag_values": rosbag_values}

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "evaluation/drive_facts.h"
 #include "geodesy/enu_anchor.h"
 #include "geometry/se3.h"
+#include "roadfix/import/picture_store.h"
 #include "samples/samples.h"
 
 namespace roadfix {
@@ -43,10 +45,12 @@ struct DriveDescription {
   std::vector<OutagePlan> windows;
 };
 
-/// One picture in a JPEG or PNG file.
+/// One picture in a JPEG or PNG file, or in a store; `path` then only names it in errors.
 struct FrameFile {
   int64_t t_us = 0;
   std::filesystem::path path;
+  std::shared_ptr<PictureStore> store = nullptr;
+  std::size_t index = 0;  ///< in the store
 };
 
 /// Ground truth against the Earth.
@@ -65,7 +69,8 @@ struct LocalPose {
 };
 
 struct Drive {
-  std::string format;                                  ///< folder, kitti, euroc or poses
+  std::string format;                                  ///< of source_formats()
+  std::vector<std::string> remarks;                    ///< for the user: what was taken for what, what was left out
   std::map<std::string, std::filesystem::path> files;  ///< of a drive folder, by their name without .csv
   DriveDescription description;
   std::vector<ImuSample> imu;

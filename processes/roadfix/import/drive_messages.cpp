@@ -53,11 +53,16 @@ void set_sigma(double sigma_m, pose_t& pose) {
 
 image_t to_message(const FrameFile& frame) {
   constexpr std::size_t kMaxPicture = std::size_t{1} << 27U;  // half of what one LCM message may hold
-  const std::string bytes = read_text_file(frame.path, kMaxPicture);
   image_t message{};
   message.utime = frame.t_us;
-  message.data.assign(bytes.begin(), bytes.end());
-  message.size_bytes = static_cast<int32_t>(bytes.size());
+  if (frame.store) {
+    message.data = frame.store->read(frame.index);
+  } else {
+    const std::string bytes = read_text_file(frame.path, kMaxPicture);
+    message.data.assign(bytes.begin(), bytes.end());
+  }
+  if (message.data.size() > kMaxPicture) throw ConfigError(frame.path.string(), 0, "is longer than 128 MB");
+  message.size_bytes = static_cast<int32_t>(message.data.size());
   const auto header = read_image_header(message.data);
   if (!header) throw ConfigError(frame.path.string(), 0, "is neither a JPEG nor a PNG picture, or is cut short");
   if (!has_image_end(message.data, header->kind))

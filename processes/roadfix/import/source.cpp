@@ -9,13 +9,15 @@
 #include "roadfix/import/euroc.h"
 #include "roadfix/import/kitti.h"
 #include "roadfix/import/pose_files.h"
+#include "roadfix/import/rosbag.h"
+#include "roadfix/rosbag/bag.h"
 
 namespace roadfix {
 
 namespace fs = std::filesystem;
 
 const std::vector<std::string>& source_formats() {
-  static const std::vector<std::string> formats = {"folder", "kitti", "euroc", "poses"};
+  static const std::vector<std::string> formats = {"folder", "kitti", "euroc", "rosbag", "poses"};
   return formats;
 }
 
@@ -65,6 +67,7 @@ std::string missing(const fs::path& folder, const Layout& layout) {
 std::string detect_format(const fs::path& source) {
   std::error_code ignored;
   if (!fs::exists(source, ignored)) throw ConfigError(source.string(), 0, "no such file or folder");
+  if (is_bag(source)) return "rosbag";
   if (fs::is_regular_file(source, ignored)) return "poses";
   if (!fs::is_directory(source, ignored)) throw ConfigError(source.string(), 0, "is neither a folder nor a file");
   std::string lacks, likely;
@@ -84,6 +87,7 @@ Drive read_source(const fs::path& source, const SourceOptions& options) {
   if (options.format == "folder") return read_drive_folder(source);
   if (options.format == "kitti") return read_kitti(source);
   if (options.format == "euroc") return read_euroc(source);
+  if (options.format == "rosbag") return read_rosbag(source, options.topics);
   return read_poses(source, {options.sequence, options.times, options.reference});
 }
 

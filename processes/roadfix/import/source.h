@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 
 namespace roadfix {
 
-/// folder, kitti, euroc, poses.
+/// folder, kitti, euroc, rosbag, poses.
 const std::vector<std::string>& source_formats();
 
 /// The format that the source looks like; ConfigError with what each would need where it looks like none.
@@ -22,6 +23,8 @@ struct SourceOptions {
   std::string sequence;
   std::optional<std::filesystem::path> times;
   std::optional<std::filesystem::path> reference;
+  /// rosbag: roles (ros_choice.h) to topics, where types and names leave a choice.
+  std::map<std::string, std::string> topics = {};
 };
 
 Drive read_source(const std::filesystem::path& source, const SourceOptions& options);

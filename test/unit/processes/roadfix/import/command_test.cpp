@@ -90,7 +90,7 @@ TEST_CASE("a user's mistake ends with exit code 2 and a line that names it") {
   const std::vector<std::pair<std::string, std::string>> mistakes = {
       {"nowhere --out a.lcm", "roadfix import: nowhere: no such file or folder"},
       {"drive", "--out is required"},
-      {"drive --out a.lcm --format rosbag", "--format"},
+      {"drive --out a.lcm --format rinex", "--format"},
       {"drive --out a.lcm --without radar", "--without"},
       {"drive --out a.lcm --cut-gnss 1", "--cut-gnss requires --every"},
       {"drive --out a.lcm --cut-gnss 5 --every 1", "roadfix import: --every must not be shorter than --cut-gnss"},
