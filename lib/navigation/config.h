@@ -53,7 +53,6 @@ struct SourceList {
   bool gnss_velocity = true;
   bool gnss_heading = true;
   bool wheel_speed = true;
-  bool wheel_yaw_rate = true;
   bool nonholonomic = true;
   bool zero_motion = true;
   bool magnetic_heading = true;
@@ -130,7 +129,6 @@ void visit(SourceList& c, Visitor& v) {
   v.boolean("gnss_velocity", c.gnss_velocity);
   v.boolean("gnss_heading", c.gnss_heading);
   v.boolean("wheel_speed", c.wheel_speed);
-  v.boolean("wheel_yaw_rate", c.wheel_yaw_rate);
   v.boolean("nonholonomic", c.nonholonomic);
   v.boolean("zero_motion", c.zero_motion);
   v.boolean("magnetic_heading", c.magnetic_heading);

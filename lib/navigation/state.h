@@ -47,7 +47,6 @@ inline constexpr int kRightTurn = 49;     ///< rad, of the right camera against 
 inline constexpr int kCameraOffset = 52;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
 inline constexpr int kBaseSize = 53;
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxPoints;
-inline constexpr int kGnssStates = kWithoutCamera - kAntenna;
 
 using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
 

@@ -2,7 +2,7 @@
 /// may step: for some moments it carries what a step of one unit then would have made of the filter's errors since, and
 /// how well that explains the innovations, (N.5.8) to (N.5.10) of MODEL.md.
 ///
-/// Knows the base block alone; measurements with other columns end what is carried (forget()).
+/// Knows the base block alone; measurements with other columns end what is carried: begin() again after them.
 #pragma once
 
 #include <array>
@@ -35,10 +35,6 @@ class StepDetector {
 
   /// The filter's covariance step.
   void move(const Eigen::Matrix<double, 9, kInertialSize>& F, const Eigen::Matrix<double, kWithoutCamera, 1>& decay);
-  /// The reference point moved by d, (N.1.5).
-  void move_reference(const Eigen::Matrix3d& D) {
-    if (watches_) per_unit_.middleRows<3>(kPos) -= D * per_unit_.middleRows<3>(kAtt);
-  }
   /// The filter's update: `whitened` innovation u = L^-1 r, Y = P H' L^-T; `counts`: it is evidence.
   template <int Rows>
   void use(const Eigen::Matrix<double, Rows, kWithoutCamera>& H, const Eigen::Matrix<double, Rows, Rows>& L,
