@@ -6,19 +6,19 @@ from support import Skipped
 
 STAGES = "gnss_ins_ekf"
 CHANNEL = "POSE_INS"
-NO_WHEELS = ("--without", "wheels")
+NO_WHEELS = ("without=wheels",)
 ADIS_PHASES = (0, 30, 60, 90, 120, 150)
 YAW_STARTS_S = (100, 260, 420, 580, 740, 900, 1060, 1220)
 YAW_AFTER_S = 60.0
 NEES_SEEDS = 50
 
 
-def adis(runs, *flags):
-    return runs.scored(CHANNEL, STAGES, "adis_semisim", *flags)
+def adis(runs, *words):
+    return runs.scored(CHANNEL, STAGES, "adis_semisim", *words)
 
 
-def adis_window(length, *flags):
-    return lambda runs: runs.windows(CHANNEL, STAGES, "adis_semisim", length, 300, 180, ADIS_PHASES, *flags)
+def adis_window(length, *words):
+    return lambda runs: runs.windows(CHANNEL, STAGES, "adis_semisim", length, 300, 180, ADIS_PHASES, *words)
 
 
 def car_window(length, every, phases):
@@ -26,15 +26,15 @@ def car_window(length, every, phases):
 
 
 def spikes(runs):
-    flags = ("--gnss-spike", 20, "--every-fix", 90, "--azimuth-seed", 1)
-    return adis(runs, *flags, *NO_WHEELS)["errors"]["horizontal_m"]["rmse"]
+    words = ("spike_m=20", "every_fix=90", "azimuth_seed=1")
+    return adis(runs, *words, *NO_WHEELS)["errors"]["horizontal_m"]["rmse"]
 
 
-def biased(runs, *flags):
+def biased(runs, *words):
     """Five fixes 15 m off after each 30 s window; the outages themselves count as well."""
-    cut = ("--cut-gnss", 30, "--every", 180, "--after", 300, "--phase", 0)
-    bias = ("--gnss-bias-after-outage", 15, "--fixes", 5, "--azimuth-seed", 1)
-    return adis(runs, *cut, *bias, *flags)["errors"]["horizontal_m"]
+    cut = ("cut_gnss_s=30", "every_s=180", "after_s=300", "phase_s=0")
+    bias = ("bias_m=15", "fixes=5", "azimuth_seed=1")
+    return adis(runs, *cut, *bias, *words)["errors"]["horizontal_m"]
 
 
 def moving_starts(runs):
@@ -50,10 +50,9 @@ def yaw_unknown_deg(runs):
     """Yaw error 60 s of driving after a start in motion, heading unknown; the worst of eight starts."""
     worst = 0.0
     for start in moving_starts(runs):
-        flags = ("--start-after", start, "--score-skip", YAW_AFTER_S, *NO_WHEELS)
-        adis(runs, *flags)
-        path = runs.folder("adis_semisim", *flags) / "report" / f"{CHANNEL}_errors.csv"
-        with open(path, newline="") as file:
+        words = (f"start_after_s={start}", f"score_skip_s={YAW_AFTER_S}", *NO_WHEELS)
+        ((_, folder),) = runs.recorded(STAGES, "adis_semisim", *words)
+        with open(folder / "report" / f"{CHANNEL}_errors.csv", newline="") as file:
             row = next(csv.DictReader(file), None)
         if row is None:
             raise Skipped(f"no pose is scored after a start at {start} s")
@@ -62,7 +61,7 @@ def yaw_unknown_deg(runs):
 
 
 def car_1hz(runs):
-    return runs.scored(CHANNEL, STAGES, "car_0708", "--gnss-every", 4)
+    return runs.scored(CHANNEL, STAGES, "car_0708", "gnss_every=4")
 
 
 def nees(runs):

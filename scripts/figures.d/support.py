@@ -72,16 +72,16 @@ class Runs:
         replace = ("--overwrite",) if writes and "--overwrite" not in arguments else ()
         return self.call(self.program("roadfix"), *arguments, *replace)
 
-    def imported(self, drive, *flags):
-        """(log, vehicle folder) of a drive of ../shared/data imported with these flags."""
+    def imported(self, drive):
+        """(log, vehicle folder) of a drive of ../shared/data."""
 
         def run():
-            folder = self.folder(drive, *flags)
+            folder = self.folder(drive)
             log, vehicle = folder / "drive.lcm", folder / "vehicle"
-            self.roadfix("import", self.drive(drive), "--out", log, "--vehicle", vehicle, "--overwrite", *flags)
+            self.roadfix("import", self.drive(drive), "--out", log, "--vehicle", vehicle, "--overwrite")
             return log, vehicle
 
-        return self.once(("import", drive, flags), run)
+        return self.once(("import", drive), run)
 
     def fleet(self, stages, scenario, seeds, *words, aligned=()):
         """(figures of every channel, folder) of a scenario with each of the seeds 1 to `seeds`, in their order, by `roadfix fleet`. Words are KEY=VALUE;
@@ -104,43 +104,33 @@ class Runs:
         path.mkdir(parents=True, exist_ok=True)
         return path
 
-    def replayed(self, stages, drive, *flags):
-        """(output log, printed text) of the replay of an imported drive; the drive log is deleted afterwards."""
+    def recorded(self, stages, drive, *words, config=None, align=None, fit_latency=False):
+        """(figures of every channel, folder) of each drive that these words of `roadfix fleet` make of a recording of ../shared/data, in their order;
+        `config` is a folder with a tuning, `align` a pair (channel, alignment). The errors of a channel lie in report/CHANNEL_errors.csv of its
+        drive's folder."""
 
         def run():
-            log, vehicle = self.imported(drive, *flags)
-            out = self.folder(drive, *flags) / "out.lcm"
-            text = self.roadfix("replay", log, "--stages", stages, "--config", vehicle, "--out", out)
-            return out, text
+            self.drive(drive)
+            path = self.folder("fleet", drive, *words)
+            flags = [*(("--config", config) if config else ()), *(("--align", "=".join(align)) if align else ()), *(("--fit-latency",) if fit_latency else ())]
+            self.roadfix("fleet", "run", drive, *words, "--root", self.shared / "data", "--stages", stages, *flags, "--keep", "errors", "--engine", "local",
+                         "--out", path, "--overwrite")
+            folders = sorted(path.glob("tasks/*"))
+            return [(json.loads((folder / "result.json").read_text())["figures"]["channels"], folder) for folder in folders]
 
-        return self.once(("replay", stages, drive, flags), run)
+        return self.once(("recorded", stages, drive, words, config, align, fit_latency), run)
 
-    def scored(self, channel, stages, drive, *flags, evaluate=()):
-        """The figures of one channel (figures.json of roadfix evaluate) after import, replay and evaluation."""
+    def scored(self, channel, stages, drive, *words, **options):
+        """The figures of one channel of one recording, by recorded()."""
+        ((channels, _),) = self.recorded(stages, drive, *words, **options)
+        return channels[channel]
 
-        def run():
-            out, _ = self.replayed(stages, drive, *flags)
-            report = self.folder(drive, *flags) / "report"
-            self.roadfix("evaluate", out, "--out", report, "--channel", channel, *evaluate)
-            figures = json.loads((report / "figures.json").read_text())
-            out.unlink()  # windows make dozens of runs; the figures are what is kept
-            self.imported(drive, *flags)[0].unlink()
-            del self.known[("import", drive, flags)], self.known[("replay", stages, drive, flags)]
-            return figures["channels"][channel]
-
-        return self.once(("score", channel, stages, drive, flags, evaluate), run)
-
-    def windows(self, channel, stages, drive, length, first, every, phases, *flags):
-        """RMS of the horizontal errors at the ends of all outages of all phases, m; one drive of a fleet a phase. Flags are those of roadfix import."""
-        self.drive(drive)
-        changes = [f"{key.lstrip('-')}={value}" for key, value in zip(flags[::2], flags[1::2])]
+    def windows(self, channel, stages, drive, length, first, every, phases, *words):
+        """RMS of the horizontal errors at the ends of all outages of all phases, m; one drive of a fleet a phase."""
         cut = (f"cut_gnss_s={length}", f"every_s={every}", f"after_s={first}", f"phase_s={','.join(map(str, phases))}")
-        path = self.folder("fleet", drive, length, first, every, *flags)
-        self.roadfix("fleet", "run", drive, *cut, *changes, "--root", self.shared / "data", "--stages", stages, "--channel", channel, "--keep", "none",
-                     "--engine", "local", "--out", path, "--overwrite")
         ends = []
-        for phase, result in zip(phases, sorted(path.glob("tasks/*/result.json"))):
-            outages = json.loads(result.read_text())["figures"]["channels"][channel]["outages"]
+        for phase, (channels, _) in zip(phases, self.recorded(stages, drive, *cut, *words)):
+            outages = channels[channel]["outages"]
             if outages["missing"]:
                 raise Skipped(f"{outages['missing']} outages of phase {phase} end without an estimate")
             ends += [outage["horizontal_m"] for outage in outages["each"]]
