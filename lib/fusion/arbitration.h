@@ -1,29 +1,10 @@
-/// Ock et al. (2020), section 3.2: do the camera and the wheels agree? As printed, (14) and (15), and as a normalised test on
-/// relative motion with hysteresis (MODEL.md, section 7).
+/// Do the camera and the wheels agree? A normalised test on relative motion with hysteresis (MODEL.md, section 7); the printed test of
+/// Ock et al. (2020) is in papers/arbitration.h.
 #pragma once
 
 #include <Eigen/Dense>
 
-#include "geometry/euler.h"
-
 namespace roadfix {
-
-/// x, y and the three angles: what Ock et al. (2020) compares.
-struct PaperPose {
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< m
-  YawPitchRoll angles;
-};
-
-/// O_diff, Ock et al. (2020), (14), with the division by three that is printed and has no reason. Zero whenever position alone or
-/// attitude alone differs.
-double printed_difference(const PaperPose& wheels, const PaperPose& visual);
-
-struct Arbitrated {
-  PaperPose pose;
-  bool visual_used = true;
-};
-/// Ock et al. (2020), (15): the mean of both up to the threshold, the wheels beyond it. Angles are averaged on the circle.
-Arbitrated printed_arbitration(const PaperPose& wheels, const PaperPose& visual, double threshold);
 
 struct AgreementConfig {
   double gate = 16.3;   ///< squared Mahalanobis distance of one comparison (3 degrees of freedom) that counts against

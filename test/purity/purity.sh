@@ -3,7 +3,7 @@
 #   purity.sh ROOT
 set -uo pipefail
 cd "$1" || exit 2
-order=(geometry statistics geodesy samples stream inertial vehicle gnss_ins wheel camera features navigation slam msckf fusion health evaluation simulation)
+order=(geometry statistics geodesy samples stream inertial vehicle gnss_ins wheel camera features navigation slam msckf fusion papers health evaluation simulation)
 estimators=' gnss_ins wheel slam msckf navigation fusion '
 breaches=0
 

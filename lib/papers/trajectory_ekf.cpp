@@ -1,4 +1,4 @@
-#include "fusion/trajectory_ekf.h"
+#include "papers/trajectory_ekf.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-/// Kim and Kang (2025): a filter on the trajectory of a visual odometry (MODEL.md, section 8).
+/// Kim and Kang (2025): a filter on the trajectory of a visual odometry (MODEL.md, section 1).
 ///
 /// LiteralTrajectoryEkf is the paper's: state (x, y), control = the odometry's own displacement, measurement = the
 /// odometry's own position. It is the identity: started at the first measurement, every innovation is zero. Kept to

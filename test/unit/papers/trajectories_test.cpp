@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "evaluation/alignment.h"
-#include "fusion/trajectory_ekf.h"
+#include "papers/trajectory_ekf.h"
 #include "support/shared_data.h"
 
 namespace roadfix {
