@@ -13,7 +13,7 @@ constexpr int64_t kRecent_us = 500'000;
 /// Motions are compared between moments that both have passed, also the slower one.
 constexpr int64_t kStep_us = 100'000;
 
-void compare_places(const PoseWatch::Point& a, const PoseWatch::Point& b, const ConsistencyLimits& limits,
+void compare_places(const PoseMonitor::Point& a, const PoseMonitor::Point& b, const ConsistencyLimits& limits,
                     Agreement& agreement) {
   const Eigen::Vector2d d = (a.T_frame_vehicle.p - b.T_frame_vehicle.p).head<2>();
   const Eigen::Matrix2d S = a.cov + b.cov + 1e-6 * Eigen::Matrix2d::Identity();
@@ -23,47 +23,47 @@ void compare_places(const PoseWatch::Point& a, const PoseWatch::Point& b, const 
 }
 
 /// In the vehicle's axes at the beginning, so that the frames do not matter.
-Eigen::Vector2d motion(const PoseWatch::Point& from, const PoseWatch::Point& to) {
+Eigen::Vector2d motion(const PoseMonitor::Point& from, const PoseMonitor::Point& to) {
   return (from.T_frame_vehicle.q.conjugate() * (to.T_frame_vehicle.p - from.T_frame_vehicle.p)).head<2>();
 }
 
 }  // namespace
 
-std::optional<Agreement> compare(const PoseWatch& a, const PoseWatch& b, int64_t now_us,
+std::optional<Agreement> compare(const PoseMonitor& a, const PoseMonitor& b, int64_t now_us,
                                  const ConsistencyLimits& limits) {
-  for (const PoseWatch* pose : {&a, &b}) {
+  for (const PoseMonitor* pose : {&a, &b}) {
     if (!pose->usable() || !pose->newest()->metric || now_us - pose->newest_now_us() > kRecent_us) return std::nullopt;
   }
   const int64_t newest_us = std::min(a.newest()->odometry.t_us, b.newest()->odometry.t_us);
   const int64_t to_us = newest_us - newest_us % kStep_us - kStep_us;
   const int64_t from_us = to_us - std::llround(limits.window * 1e6);
-  const std::optional<PoseWatch::Point> a_to = a.at(to_us), b_to = b.at(to_us);
+  const std::optional<PoseMonitor::Point> a_to = a.at(to_us), b_to = b.at(to_us);
   if (!a_to || !b_to) return std::nullopt;
   Agreement agreement;
   agreement.a = a.name();
   agreement.b = b.name();
   if (a.newest()->anchor && b.newest()->anchor) compare_places(*a_to, *b_to, limits, agreement);
-  const std::optional<PoseWatch::Point> a_from = a.at(from_us), b_from = b.at(from_us);
+  const std::optional<PoseMonitor::Point> a_from = a.at(from_us), b_from = b.at(from_us);
   if (a_from && b_from && a_from->segment == a_to->segment && b_from->segment == b_to->segment) {
     const Eigen::Vector2d a_motion = motion(*a_from, *a_to), b_motion = motion(*b_from, *b_to);
     agreement.motion = (a_motion - b_motion).norm();
-    agreement.way = std::max(a_motion.norm(), b_motion.norm());
-    agreement.contradicts_motion = *agreement.motion > limits.motion + limits.motion_share * agreement.way;
+    agreement.distance = std::max(a_motion.norm(), b_motion.norm());
+    agreement.contradicts_motion = *agreement.motion > limits.motion + limits.motion_share * agreement.distance;
   }
   return agreement;
 }
 
-void judge(const Agreement& g, double window_s, std::vector<Condition>& out) {
-  const std::string key = "agreement." + g.a + "." + g.b;
-  if (g.contradicts_place) {
+void check(const Agreement& agreement, double window_s, std::vector<Condition>& out) {
+  const std::string key = "agreement." + agreement.a + "." + agreement.b;
+  if (agreement.contradicts_place) {
     out.push_back({key + ".place", Verdict::kDegraded, kRankConsistency,
-                   fmt::format("{} and {} are {:.1f} m apart, {:.0f} times what they claim together", g.a, g.b,
-                               *g.apart, *g.sigmas)});
+                   fmt::format("{} and {} are {:.1f} m apart, {:.0f} times what they claim together", agreement.a,
+                               agreement.b, *agreement.apart, *agreement.sigmas)});
   }
-  if (g.contradicts_motion) {
+  if (agreement.contradicts_motion) {
     out.push_back({key + ".motion", Verdict::kDegraded, kRankConsistency,
-                   fmt::format("{} and {} differ by {:.1f} m about the last {:.0f} s ({:.1f} m of way)", g.a, g.b,
-                               *g.motion, window_s, g.way)});
+                   fmt::format("{} and {} differ by {:.1f} m about the last {:.0f} s ({:.1f} m of way)", agreement.a,
+                               agreement.b, *agreement.motion, window_s, agreement.distance)});
   }
 }
 

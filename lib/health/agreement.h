@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "health/pose_watch.h"
+#include "health/pose_monitor.h"
 
 namespace roadfix {
 
@@ -15,15 +15,15 @@ struct Agreement {
   std::optional<double> apart;   ///< m between two absolute poses of one moment
   std::optional<double> sigmas;  ///< that distance in standard deviations of both together
   std::optional<double> motion;  ///< m between their two motions over the window
-  double way = 0.0;              ///< m, the longer of the two motions
+  double distance = 0.0;         ///< m, the longer of the two motions
   bool contradicts_place = false;
   bool contradicts_motion = false;
 };
 
 /// Of two estimates whose newest outputs are recent; absent where there is nothing to compare.
-std::optional<Agreement> compare(const PoseWatch& a, const PoseWatch& b, int64_t now_us,
+std::optional<Agreement> compare(const PoseMonitor& a, const PoseMonitor& b, int64_t now_us,
                                  const ConsistencyLimits& limits);
 
-void judge(const Agreement& agreement, double window_s, std::vector<Condition>& out);
+void check(const Agreement& agreement, double window_s, std::vector<Condition>& out);
 
 }  // namespace roadfix

@@ -1,5 +1,5 @@
-/// Hysteresis: conditions come and go with every look; what is told does not flicker. The first look counts at once:
-/// before it nothing is known to be well.
+/// Hysteresis: conditions come and go with every update; what is reported does not flicker. The first one counts at
+/// once: before it nothing is known to be well.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ class Alarms {
  public:
   explicit Alarms(const AlarmConfig& config);
 
-  /// `seen`: what holds at this moment. True where the verdict or the set of reasons is another than before.
-  bool update(int64_t now_us, const std::vector<Condition>& seen);
+  /// `active`: what holds at this moment. True where the verdict or the set of reasons is another than before.
+  bool update(int64_t now_us, const std::vector<Condition>& active);
 
   [[nodiscard]] Verdict verdict() const { return verdict_; }
   [[nodiscard]] int64_t since_us() const { return since_us_; }  ///< when the verdict last changed
@@ -28,7 +28,7 @@ class Alarms {
     Condition condition;
     int64_t first_us = 0;
     int64_t last_us = 0;
-    bool told = false;
+    bool raised = false;
   };
 
   int64_t raise_us_, clear_us_;

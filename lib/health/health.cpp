@@ -11,10 +11,10 @@ namespace roadfix {
 
 namespace {
 
-constexpr int64_t kGrid_us = 100'000;
-constexpr int64_t kMostMadeUp_us = 20'000'000;
+constexpr int64_t kDecisionGrid_us = 100'000;
+constexpr int64_t kMaxCatchUp_us = 20'000'000;
 /// Stamps that are further off than this belong to a drive that is played again.
-constexpr int64_t kPlayed_us = 2'000'000;
+constexpr int64_t kReplayLag_us = 2'000'000;
 
 }  // namespace
 
@@ -28,7 +28,7 @@ Health::Health(const HealthConfig& config, const Expectations& expectations)
   }
 }
 
-ChannelWatch& Health::channel(const std::string& name) {
+ChannelMonitor& Health::channel(const std::string& name) {
   return channels_.try_emplace(name, name, config_.channel, std::nullopt).first->second;
 }
 
@@ -60,34 +60,34 @@ void Health::to_common_frame(PoseFacts& facts) {
 
 void Health::pose(const std::string& name, int64_t now_us, PoseFacts facts) {
   to_common_frame(facts);
-  PoseWatch& watch = poses_.try_emplace(name, name, config_.pose).first->second;
-  if (watch.begins_anew(facts)) {
+  PoseMonitor& monitor = poses_.try_emplace(name, name, config_.pose).first->second;
+  if (monitor.is_restart(facts)) {
     for (auto& [source, measurements] : sources_) {
-      if (source.starts_with(name + " in ")) measurements.begin_again();
+      if (source.starts_with(name + " in ")) measurements.reset();
     }
   }
-  watch.seen(now_us, facts);
+  monitor.add(now_us, facts);
 }
 
 void Health::measurement(const std::string& source, int64_t now_us, double nis, int dof, bool accepted) {
-  sources_.try_emplace(source, source, config_.consistency).first->second.seen(now_us, nis, dof, accepted);
+  sources_.try_emplace(source, source, config_.consistency).first->second.add(now_us, nis, dof, accepted);
 }
 
 void Health::host(int64_t now_us, const HostFacts& facts) {
-  if (facts.kernel_drops > host_.kernel_drops) own_drops_.add(now_us, facts.kernel_drops - host_.kernel_drops);
+  if (facts.kernel_drops > host_.kernel_drops) monitor_drops_.add(now_us, facts.kernel_drops - host_.kernel_drops);
   host_ = facts;
 }
 
 std::optional<int64_t> Health::next_decision(int64_t now_us) {
   if (!start_us_) {
     start_us_ = now_us;
-    decided_us_ = now_us - now_us % kGrid_us;
+    decided_us_ = now_us - now_us % kDecisionGrid_us;
     return std::nullopt;
   }
-  const int64_t newest = now_us - now_us % kGrid_us;
-  decided_us_ = std::max(decided_us_, newest - kMostMadeUp_us);
-  if (decided_us_ + kGrid_us > newest) return std::nullopt;
-  return decided_us_ + kGrid_us;
+  const int64_t newest = now_us - now_us % kDecisionGrid_us;
+  decided_us_ = std::max(decided_us_, newest - kMaxCatchUp_us);
+  if (decided_us_ + kDecisionGrid_us > newest) return std::nullopt;
+  return decided_us_ + kDecisionGrid_us;
 }
 
 std::string Health::judged_pose() const {
@@ -98,42 +98,42 @@ std::string Health::judged_pose() const {
 }
 
 /// Stamps of today are taken as they are; those of a drive that is played again less what all channels have in common.
-int64_t Health::common_lag_us() const {
+int64_t Health::median_lag_us() const {
   std::vector<int64_t> lags;
-  for (const auto& [name, watch] : channels_) {
-    // What fell silent, or was forged for a while, has no say in what the time is now.
-    const std::optional<int64_t> lag = watch.is_fresh(decided_us_) ? watch.lag_us() : std::nullopt;
+  for (const auto& [name, monitor] : channels_) {
+    // What fell silent, or was forged for a while, does not count for what the time is now.
+    const std::optional<int64_t> lag = monitor.is_fresh(decided_us_) ? monitor.lag_us() : std::nullopt;
     if (lag) lags.push_back(*lag);
   }
   if (lags.empty()) return lag_us_;
   const auto middle = lags.begin() + static_cast<std::ptrdiff_t>(lags.size() / 2);
   std::nth_element(lags.begin(), middle, lags.end());
-  return std::abs(*middle) > kPlayed_us ? *middle : 0;
+  return std::abs(*middle) > kReplayLag_us ? *middle : 0;
 }
 
 bool Health::decide(int64_t now_us) {
   decided_us_ = now_us;
-  lag_us_ = common_lag_us();
-  std::vector<Condition> seen;
-  judge_host(seen);
+  lag_us_ = median_lag_us();
+  std::vector<Condition> conditions;
+  check_host(conditions);
   const int64_t start_us = *start_us_ + std::llround(config_.start_grace * 1e6);
-  for (const auto& [name, watch] : processes_) watch.judge(now_us, start_us, seen);
+  for (const auto& [name, monitor] : processes_) monitor.check(now_us, start_us, conditions);
   const std::string judged = judged_pose();
-  for (auto& [name, watch] : channels_) {
-    watch.judge(now_us, start_us, lag_us_, name == judged ? Verdict::kDoNotUse : Verdict::kDegraded, seen);
+  for (auto& [name, monitor] : channels_) {
+    monitor.check(now_us, start_us, lag_us_, name == judged ? Verdict::kDoNotUse : Verdict::kDegraded, conditions);
   }
   if (judged.empty()) {
     std::string names;
     for (const std::string& name : expectations_.judged_poses) names += (names.empty() ? "" : " or ") + name;
-    seen.push_back({"pose.none", Verdict::kDoNotUse, kRankPose, "No estimate yet: nobody publishes " + names});
+    conditions.push_back({"pose.none", Verdict::kDoNotUse, kRankPose, "No estimate yet: nobody publishes " + names});
   }
-  for (const auto& [name, watch] : poses_) watch.judge(now_us, name == judged, seen);
-  for (const auto& [name, watch] : sources_) watch.judge(now_us, seen);
-  for (const Agreement& agreement : agreements()) judge(agreement, config_.consistency.window, seen);
-  return alarms_.update(now_us, seen);
+  for (const auto& [name, monitor] : poses_) monitor.check(now_us, name == judged, conditions);
+  for (const auto& [name, monitor] : sources_) monitor.check(now_us, conditions);
+  for (const Agreement& agreement : agreements()) check(agreement, config_.consistency.window, conditions);
+  return alarms_.update(now_us, conditions);
 }
 
-void Health::judge_host(std::vector<Condition>& out) const {
+void Health::check_host(std::vector<Condition>& out) const {
   if (host_.free_disk_gib && *host_.free_disk_gib < config_.process.disk_gib) {
     out.push_back({"host.disk", Verdict::kDegraded, kRankHost,
                    fmt::format("The disk has only {:.1f} GiB left", *host_.free_disk_gib)});
@@ -143,7 +143,7 @@ void Health::judge_host(std::vector<Condition>& out) const {
                    fmt::format("The computer's clock was set by {:+.1f} s; the stack goes on without the step",
                                *host_.clock_step_s)});
   }
-  if (const int64_t drops = own_drops_.within(decided_us_); drops > 0) {
+  if (const int64_t drops = monitor_drops_.within(decided_us_); drops > 0) {
     out.push_back({"host.monitor_drops", Verdict::kDegraded, kRankHost,
                    fmt::format("The monitor itself lost {} datagrams and may miss things", drops)});
   }
@@ -169,10 +169,10 @@ HealthReport Health::report() const {
   report.reasons = alarms_.reasons();
   report.judged_pose = judged_pose();
   report.lag_s = static_cast<double>(lag_us_) * 1e-6;
-  for (const auto& [name, watch] : channels_) report.channels.push_back(watch.report(decided_us_, lag_us_));
-  for (const auto& [name, watch] : processes_) report.processes.push_back(watch.report(decided_us_));
-  for (const auto& [name, watch] : poses_) report.poses.push_back(watch.report());
-  for (const auto& [name, watch] : sources_) report.consistency.push_back(watch.report(decided_us_));
+  for (const auto& [name, monitor] : channels_) report.channels.push_back(monitor.report(decided_us_, lag_us_));
+  for (const auto& [name, monitor] : processes_) report.processes.push_back(monitor.report(decided_us_));
+  for (const auto& [name, monitor] : poses_) report.poses.push_back(monitor.report());
+  for (const auto& [name, monitor] : sources_) report.consistency.push_back(monitor.report(decided_us_));
   report.agreements = agreements();
   return report;
 }

@@ -1,4 +1,4 @@
-/// What the monitor decides, without bus, clock or file: told what was seen and when, it says whether the estimate may
+/// What the monitor decides, without bus, clock or file: from what arrived and when it follows whether the estimate may
 /// be used, and why not.
 ///
 /// Time is data: `now` comes with every call and never runs backwards here; live it is the clock, of a log the time of
@@ -13,10 +13,10 @@
 
 #include "health/agreement.h"
 #include "health/alarms.h"
-#include "health/channel_watch.h"
-#include "health/nis_watch.h"
-#include "health/pose_watch.h"
-#include "health/process_watch.h"
+#include "health/channel_monitor.h"
+#include "health/nis_monitor.h"
+#include "health/pose_monitor.h"
+#include "health/process_monitor.h"
 
 namespace roadfix {
 
@@ -32,7 +32,7 @@ struct HealthReport {
   Verdict verdict = Verdict::kDoNotUse;
   int64_t since_us = 0;
   std::vector<Condition> reasons;
-  std::string judged_pose;  ///< the channel that the verdict is about; empty: none was heard
+  std::string judged_pose;  ///< the channel that the verdict is about; empty: none has arrived
   double lag_s = 0.0;       ///< of a drive that is played again: how old its stamps are
   std::vector<ChannelReport> channels;
   std::vector<ProcessReport> processes;
@@ -63,8 +63,8 @@ class Health {
 
   [[nodiscard]] Verdict verdict() const { return alarms_.verdict(); }
   [[nodiscard]] HealthReport report() const;  ///< of the last decision
-  [[nodiscard]] const std::map<std::string, PoseWatch>& poses() const { return poses_; }
-  /// Of the frame that absolute poses are kept in here: the first one offered or heard.
+  [[nodiscard]] const std::map<std::string, PoseMonitor>& poses() const { return poses_; }
+  /// Of the frame that absolute poses are kept in here: the first one offered or received.
   [[nodiscard]] const std::optional<Geodetic>& anchor() const { return anchor_; }
   void offer_anchor(const Geodetic& anchor) {
     if (!anchor_) anchor_ = anchor;
@@ -73,23 +73,23 @@ class Health {
   void to_common_frame(PoseFacts& facts);
 
  private:
-  ChannelWatch& channel(const std::string& name);
+  ChannelMonitor& channel(const std::string& name);
   [[nodiscard]] std::string judged_pose() const;
-  [[nodiscard]] int64_t common_lag_us() const;
-  void judge_host(std::vector<Condition>& out) const;
+  [[nodiscard]] int64_t median_lag_us() const;
+  void check_host(std::vector<Condition>& out) const;
   [[nodiscard]] std::vector<Agreement> agreements() const;
 
   HealthConfig config_;
   Expectations expectations_;
   Alarms alarms_;
-  std::map<std::string, ChannelWatch> channels_;
-  std::map<std::string, ProcessWatch> processes_;
-  std::map<std::string, PoseWatch> poses_;
-  std::map<std::string, NisWatch> sources_;
+  std::map<std::string, ChannelMonitor> channels_;
+  std::map<std::string, ProcessMonitor> processes_;
+  std::map<std::string, PoseMonitor> poses_;
+  std::map<std::string, NisMonitor> sources_;
   HostFacts host_;
-  Recent own_drops_;
+  Recent monitor_drops_;
   std::optional<Geodetic> anchor_;
-  std::optional<int64_t> start_us_;  ///< the first thing told
+  std::optional<int64_t> start_us_;  ///< of the first call
   int64_t decided_us_ = 0;
   int64_t lag_us_ = 0;
 };

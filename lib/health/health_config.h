@@ -14,7 +14,7 @@ struct AlarmConfig {
 };
 
 struct ChannelLimits {
-  double learn = 3.0;            ///< s of listening before a rate counts as known
+  double learn = 3.0;            ///< s of messages before a rate counts as known
   double silent_periods = 2.5;   ///< of the expected rate; a slow channel: silent_at_least after it was due
   double silent_at_least = 0.3;  ///< s; a shorter gap is no silence, however fast the channel
   double slow_share = 0.7;       ///< of the expected rate
@@ -22,7 +22,7 @@ struct ChannelLimits {
   double lost_share = 0.05;      ///< of the messages of one second
   double latency = 0.25;         ///< s after the stamp; no shipped stage waits longer (docs/DESIGN.md, section 4)
   double ahead = 0.1;            ///< s before the stamp
-  double stamp_jump = 0.5;       ///< s between what the stamps say and what the clock says
+  double stamp_jump = 0.5;       ///< s between the steps of stamps and clock
   double frozen_after = 0.5;     ///< s with one and the same content, and at least frozen_messages of them
   int frozen_messages = 5;
 };
@@ -39,14 +39,14 @@ struct ConsistencyLimits {
   double window = 2.0;         ///< s of measurements that a NIS is averaged over; slow sources: their last five
   double nis_ratio = 5.0;      ///< of mean NIS to degrees of freedom
   double refused_share = 0.5;  ///< of the measurements in the window
-  double apart = 1.5;          ///< m that two absolute poses may be apart, whatever they claim
+  double apart = 1.5;          ///< m that two absolute poses may be apart, whatever their covariances
   double apart_sigmas = 5.0;   ///< beyond which they contradict each other
   double motion = 0.75;        ///< m by which two motions over the window may differ
-  double motion_share = 0.1;   ///< of the way, on top
+  double motion_share = 0.1;   ///< of the distance, on top
 };
 
 struct ProcessLimits {
-  double heartbeat = 2.5;  ///< s without a sign of life; 2.5 of its intervals where a process beats faster
+  double heartbeat = 2.5;  ///< s without a heartbeat; 2.5 of its intervals where a process beats faster
   double cpu_share = 0.9;  ///< of one core
   double memory_mib = 4096.0;
   double queue_age = 0.5;   ///< s that an input may wait for its handler
@@ -63,7 +63,7 @@ struct HealthConfig {
   ProcessLimits process;
 };
 
-/// What this vehicle should have; what is not told is learnt.
+/// What this vehicle should have; what is not given is learnt.
 struct ExpectedChannel {
   std::string name;
   std::optional<double> rate;  ///< Hz
@@ -73,7 +73,7 @@ struct Expectations {
   std::vector<ExpectedChannel> channels;
   std::vector<std::string> processes;
   std::vector<std::string> several = {"monitor"};  ///< may run more than once side by side: who only looks
-  /// The estimate that the verdict is about: the first of these that was ever heard.
+  /// The estimate that the verdict is about: the first of these that was ever received.
   std::vector<std::string> judged_poses = {"POSE_FUSED", "POSE_INS"};
 };
 

@@ -12,7 +12,7 @@ class Recent {
   void add(int64_t now_us, int64_t count = 1) {
     total_ += count;
     events_.emplace_back(now_us, count);
-    drop(now_us);
+    discard_old(now_us);
   }
 
   [[nodiscard]] int64_t within(int64_t now_us) const {
@@ -26,7 +26,7 @@ class Recent {
   static constexpr int64_t kWindow_us = 1'000'000;
   static constexpr std::size_t kMaxEvents = 2000;  ///< a flood is counted in full in total(), not kept in full
 
-  void drop(int64_t now_us) {
+  void discard_old(int64_t now_us) {
     while (!events_.empty() && (now_us - events_.front().first >= kWindow_us || events_.size() > kMaxEvents)) {
       events_.pop_front();
     }

@@ -1,4 +1,4 @@
-/// What the monitor says: may the pose be used, and if not, why.
+/// What the monitor decides: may the pose be used, and if not, why.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ enum class Verdict { kOk = 0, kDegraded = 1, kDoNotUse = 2 };
 struct Condition {
   std::string key;  ///< stable, for programs: "channel.GNSS.silent"
   Verdict verdict = Verdict::kDegraded;
-  int rank = 0;      ///< of two that are equally bad the lower is told first: causes before their effects
+  int rank = 0;      ///< of two that are equally bad the lower is listed first: causes before their effects
   std::string text;  ///< plain words, for people
 };
 

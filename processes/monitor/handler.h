@@ -1,4 +1,4 @@
-/// Everything on the bus, told to lib/health: checks and translates, decides nothing. Live and over a log alike.
+/// Everything on the bus, handed to lib/health: checks and translates, decides nothing. Live and over a log alike.
 #pragma once
 
 #include <functional>

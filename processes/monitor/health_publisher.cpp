@@ -12,7 +12,7 @@ namespace {
 constexpr int64_t kHeartbeat_us = 1'000'000;
 /// Longer than from one heartbeat to the next.
 constexpr int64_t kListen_us = 1'200'000;
-/// An older monitor that was not heard for so long is gone.
+/// An older monitor that published nothing for so long is gone.
 constexpr int64_t kGone_us = 3'000'000;
 }  // namespace
 
@@ -33,7 +33,7 @@ void HealthPublisher::decided(const HealthReport& report, bool changed) {
   if (heartbeat_ && report.now_us - heartbeat_us_ >= kHeartbeat_us) publish_heartbeat(report.now_us);
 }
 
-void HealthPublisher::heard(const BusMessage& message, int64_t now_us) {
+void HealthPublisher::received(const BusMessage& message, int64_t now_us) {
   if (message.channel != "HEALTH" && message.channel != "HEARTBEAT_MONITOR") return;
   const std::optional<Header> header = read_header(message.bytes);
   if (!header || header->run == run_ || (run_ != 0 && header->run > run_)) return;

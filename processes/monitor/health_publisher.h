@@ -17,7 +17,7 @@ class HealthPublisher : public MonitorListener {
 
   /// Live: where HEALTH comes from a monitor that has run for longer, this one shows and is silent, until the other is.
   /// For that it listens for a while before its first word.
-  void heard(const BusMessage& message, int64_t now_us);
+  void received(const BusMessage& message, int64_t now_us);
 
   void message(const std::string&, const std::string&, const BusMessage&, int64_t) override {}
   void decided(const HealthReport& report, bool changed) override;
@@ -34,7 +34,7 @@ class HealthPublisher : public MonitorListener {
   int64_t run_ = 0;
   int64_t seq_ = 0, heartbeat_seq_ = 0;
   int64_t published_us_ = 0, heartbeat_us_ = 0;
-  std::optional<int64_t> other_us_;  ///< when an older monitor was heard last
+  std::optional<int64_t> other_us_;  ///< when an older monitor published last
 };
 
 }  // namespace roadfix

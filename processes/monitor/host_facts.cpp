@@ -4,9 +4,10 @@
 
 namespace roadfix {
 
-HostWatch::HostWatch(const std::filesystem::path& recordings) : recordings_(std::filesystem::absolute(recordings)) {}
+HostMonitor::HostMonitor(const std::filesystem::path& recordings)
+    : recordings_(std::filesystem::absolute(recordings)) {}
 
-HostFacts HostWatch::facts(int64_t now_us, int64_t kernel_drops) {
+HostFacts HostMonitor::facts(int64_t now_us, int64_t kernel_drops) {
   asked_us_ = now_us;
   HostFacts facts;
   facts.kernel_drops = kernel_drops;

@@ -1,4 +1,4 @@
-/// What only the machine itself can tell the monitor: disk and clock.
+/// What only the machine itself provides: disk and clock.
 #pragma once
 
 #include <filesystem>
@@ -8,9 +8,9 @@
 
 namespace roadfix {
 
-class HostWatch {
+class HostMonitor {
  public:
-  explicit HostWatch(const std::filesystem::path& recordings);
+  explicit HostMonitor(const std::filesystem::path& recordings);
 
   /// Once a second.
   [[nodiscard]] bool due(int64_t now_us) const { return now_us - asked_us_ >= 1'000'000; }

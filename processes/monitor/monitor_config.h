@@ -13,7 +13,7 @@ struct DashboardConfig {
   std::string listen = "127.0.0.1:8420";  ///< address:port; other addresses only with a token
   std::string token_file;  ///< the token that other addresses need; empty: a new one at each start, printed
   double rate = 5.0;       ///< Hz
-  std::string camera;      ///< the channel whose pictures are shown; empty: CAMERA_LEFT, else the first one heard
+  std::string camera;      ///< the channel whose pictures are shown; empty: CAMERA_LEFT, else the first one received
   int clients = 32;        ///< connections at once
 };
 
@@ -53,7 +53,7 @@ void visit(MonitorConfig& c, Visitor& v) {
 }
 
 /// The sensors of calibration.yaml with their rates, the processes of run.yaml, and what monitor.yaml adds. Files that
-/// are not there say nothing.
+/// are not there add nothing.
 Expectations expectations_of(const MonitorConfig& config, const std::filesystem::path& vehicle);
 
 }  // namespace roadfix

@@ -58,7 +58,7 @@ void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   if (options.realtime > 0) make_realtime(options.realtime);
   NetworkBus bus(options.bus);
   RunClock clock;
-  HostWatch host(config.recordings);
+  HostMonitor host(config.recordings);
   MonitorHandler handler(config, expectations_of(config, options.vehicle));
   HealthPublisher publisher(bus, config.publish_period, true);
   const std::unique_ptr<Dashboard> dashboard = dashboard_of(options, config, handler.health(), "the bus");
@@ -67,7 +67,7 @@ void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   if (dashboard) handler.add(dashboard->view());
   handler.add(terminal);
   bus.subscribe(".*", [&](const BusMessage& message) {
-    publisher.heard(message, clock.now_utime());
+    publisher.received(message, clock.now_utime());
     handler.take(message, clock.now_utime());
   });
   ServiceNotifier service;
@@ -102,7 +102,7 @@ void run_logs(const MonitorOptions& options, const MonitorConfig& config) {
   }
   refuse_existing_file(options.log_out, options.overwrite);
   MergedLogs logs(options.logs);
-  // A log tells what its car had; which processes should have run, its HEARTBEAT channels tell.
+  // A log shows what its car had; its HEARTBEAT channels show which processes should have run.
   Expectations expectations = expectations_of(config, options.vehicle);
   expectations.processes.clear();
   MonitorHandler handler(config, expectations);

@@ -146,7 +146,7 @@ void put_channels(Page& page, const HealthReport& report) {
                         "jitter ms", "lost", "bad"),
             kBold);
   for (const ChannelReport& c : report.channels) {
-    if (!comes_at_a_rate(c.name)) continue;
+    if (!is_periodic(c.name)) continue;
     const std::string wanted = c.expected_hz ? fmt::format("{:.4g}", *c.expected_hz) : "?";
     const bool bad = c.silent || c.age_s < 0.0;
     page.line(fmt::format(" {:<14.14}{:>8.1f}{:>9}{:>9.2f}{:>9.0f}{:>11.0f}{:>7}{:>7}", c.name, c.rate_hz, wanted,

@@ -44,7 +44,7 @@ Json pose_json(const FramePose& pose) {
 Json channels_json(const std::vector<ChannelReport>& channels) {
   Json json = Json::array();
   for (const ChannelReport& c : channels) {
-    if (!comes_at_a_rate(c.name)) continue;
+    if (!is_periodic(c.name)) continue;
     json.push_back({{"name", c.name},
                     {"rate", number(c.rate_hz, 1)},
                     {"expected", number(c.expected_hz.value_or(kNothing), 1)},

@@ -1,5 +1,5 @@
 /// The whole drive, thin: where each estimate was, how wrong and how sure, and the verdict. Bounded: a long drive keeps
-/// fewer points a minute. An estimate's room is taken whole when it is first heard, so that hours do not make the
+/// fewer points a minute. An estimate's room is taken whole when it first arrives, so that hours do not make the
 /// monitor grow. One thread adds, others may ask.
 #pragma once
 

@@ -27,7 +27,7 @@ struct Answer {
   bool stream = false;     ///< the frames, as they come
 };
 
-/// Equal, in a time that tells nothing of where they differ.
+/// Equal, in a time that does not depend on where they differ.
 bool same_secret(std::string_view a, std::string_view b);
 
 /// `token`: empty where none is asked for; then only names of this machine are taken as host, so that no page of

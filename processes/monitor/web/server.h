@@ -1,4 +1,4 @@
-/// The dashboard's web server: one thread of low priority, read only, on this machine alone unless told otherwise.
+/// The dashboard's web server: one thread of low priority, read only, on this machine alone unless configured otherwise.
 ///
 /// A client gets the newest frame when it has taken the last one; what it misses it never gets, so that a slow one
 /// costs one frame of memory and nobody's time. Connections are limited in number, in the size of a request and in
@@ -15,7 +15,7 @@
 
 namespace roadfix {
 
-/// A dashboard that cannot be; the text says why.
+/// A dashboard that cannot be served; the text names the reason.
 struct ServerError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

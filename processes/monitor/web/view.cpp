@@ -37,7 +37,7 @@ void DriveView::message(const std::string& channel, const std::string& type, con
   if (channel == "REFERENCE") {
     PoseFacts facts = pose_facts(decode<pose_t>(message.bytes));
     health_.to_common_frame(facts);
-    if (facts.anchor) reference_.seen(now_us, facts);
+    if (facts.anchor) reference_.add(now_us, facts);
   } else if (type == "fusion_state_t") {
     fusion_ = decode<fusion_state_t>(message.bytes);
   } else if (type == "vo_status_t") {
@@ -66,40 +66,40 @@ void DriveView::keep_picture(const BusMessage& message) {
   }
 }
 
-void DriveView::pin(const PoseWatch& watch, const std::string& judged) {
-  if (!watch.usable() || watch.newest()->anchor) return;
+void DriveView::pin(const PoseMonitor& monitor, const std::string& judged) {
+  if (!monitor.usable() || monitor.newest()->anchor) return;
   const auto absolute = health_.poses().find(judged);
   if (absolute == health_.poses().end() || !absolute->second.usable() || !absolute->second.newest()->anchor) return;
   const PoseReport report = absolute->second.report();
   if (report.position_std > kPinStd || report.yaw_std > kPinYawStd) return;
-  const int64_t t_us = std::min(watch.newest()->odometry.t_us, absolute->second.newest()->odometry.t_us) - 100'000;
-  const auto local = watch.at(t_us), enu = absolute->second.at(t_us);
-  Pin& pin = pins_[watch.name()];
+  const int64_t t_us = std::min(monitor.newest()->odometry.t_us, absolute->second.newest()->odometry.t_us) - 100'000;
+  const auto local = monitor.at(t_us), enu = absolute->second.at(t_us);
+  Pin& pin = pins_[monitor.name()];
   if (!local || !enu || pin.segment == local->segment) return;
   pin.segment = local->segment;
   pin.T_enu_local = yaw_only(enu->T_frame_vehicle) * yaw_only(local->T_frame_vehicle).inverse();
 }
 
-std::optional<DriveView::Placed> DriveView::placed(const PoseWatch& watch) const {
-  if (!watch.usable()) return std::nullopt;
-  const Odometry& o = watch.newest()->odometry;
+std::optional<DriveView::Placed> DriveView::placed(const PoseMonitor& monitor) const {
+  if (!monitor.usable()) return std::nullopt;
+  const Odometry& o = monitor.newest()->odometry;
   const Eigen::Matrix2d cov = o.cov_pose.topLeftCorner<2, 2>();
-  if (watch.newest()->anchor) return Placed{o.T_frame_vehicle, cov, false};
-  const auto pin = pins_.find(watch.name());
+  if (monitor.newest()->anchor) return Placed{o.T_frame_vehicle, cov, false};
+  const auto pin = pins_.find(monitor.name());
   if (pin == pins_.end()) return std::nullopt;
   const Eigen::Matrix2d R = pin->second.T_enu_local.R().topLeftCorner<2, 2>();
   return Placed{pin->second.T_enu_local * o.T_frame_vehicle, R * cov * R.transpose(), true};
 }
 
 /// Of a moment that both the reference and the estimate have passed.
-std::optional<Eigen::Vector2d> DriveView::error(const PoseWatch& watch) const {
-  if (!reference_.usable() || !watch.usable()) return std::nullopt;
-  const int64_t t_us = std::min(reference_.newest()->odometry.t_us, watch.newest()->odometry.t_us) - 100'000;
-  const auto truth = reference_.at(t_us), estimate = watch.at(t_us);
+std::optional<Eigen::Vector2d> DriveView::error(const PoseMonitor& monitor) const {
+  if (!reference_.usable() || !monitor.usable()) return std::nullopt;
+  const int64_t t_us = std::min(reference_.newest()->odometry.t_us, monitor.newest()->odometry.t_us) - 100'000;
+  const auto truth = reference_.at(t_us), estimate = monitor.at(t_us);
   if (!truth || !estimate) return std::nullopt;
   SE3 T = estimate->T_frame_vehicle;
-  if (!watch.newest()->anchor) {
-    const auto pin = pins_.find(watch.name());
+  if (!monitor.newest()->anchor) {
+    const auto pin = pins_.find(monitor.name());
     if (pin == pins_.end()) return std::nullopt;
     T = pin->second.T_enu_local * T;
   }
@@ -108,10 +108,10 @@ std::optional<Eigen::Vector2d> DriveView::error(const PoseWatch& watch) const {
 
 History::Row DriveView::history_row(const HealthReport& report) const {
   History::Row row{report.now_us, static_cast<int>(report.verdict), {}};
-  for (const auto& [name, watch] : health_.poses()) {
-    const auto place = placed(watch);
-    if (!place || report.now_us - watch.newest_now_us() > 1'000'000) continue;
-    const auto e = error(watch);
+  for (const auto& [name, monitor] : health_.poses()) {
+    const auto place = placed(monitor);
+    if (!place || report.now_us - monitor.newest_now_us() > 1'000'000) continue;
+    const auto e = error(monitor);
     row.places[name] = {place->T_enu_vehicle.p.x(), place->T_enu_vehicle.p.y(), e ? e->x() : kNothing,
                         horizontal_ellipse(place->cov).major};
   }
@@ -123,7 +123,7 @@ History::Row DriveView::history_row(const HealthReport& report) const {
 }
 
 void DriveView::decided(const HealthReport& report, bool) {
-  for (const auto& [name, watch] : health_.poses()) pin(watch, report.judged_pose);
+  for (const auto& [name, monitor] : health_.poses()) pin(monitor, report.judged_pose);
   board_.history().add(history_row(report));
   if (!board_.watched() || report.now_us - framed_us_ < period_us_) return;
   framed_us_ = report.now_us;
@@ -132,12 +132,12 @@ void DriveView::decided(const HealthReport& report, bool) {
 
 std::string DriveView::frame(const HealthReport& report) {
   FrameParts parts(report);
-  for (const auto& [name, watch] : health_.poses()) {
+  for (const auto& [name, monitor] : health_.poses()) {
     FramePose pose;
-    pose.report = watch.report();
-    pose.age_s = seconds_between(watch.newest_now_us(), report.now_us);
-    pose.error = error(watch);
-    if (const auto place = placed(watch)) {
+    pose.report = monitor.report();
+    pose.age_s = seconds_between(monitor.newest_now_us(), report.now_us);
+    pose.error = error(monitor);
+    if (const auto place = placed(monitor)) {
       pose.on_map = FrameMark{place->T_enu_vehicle.p.head<2>(), yaw_of(place->T_enu_vehicle.q),
                               horizontal_ellipse(place->cov), place->pinned};
     }

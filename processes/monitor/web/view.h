@@ -19,7 +19,7 @@ class DriveView : public MonitorListener {
  public:
   /// Both must outlive it. `rate_hz`: frames per second, at most that of the decisions. `bytes_stay`: a log's messages
   /// stay where they are and need no copy.
-  /// `camera`: the channel whose pictures are shown; empty: CAMERA_LEFT, or another one as long as that is not heard.
+  /// `camera`: the channel whose pictures are shown; empty: CAMERA_LEFT, or another one as long as that does not arrive.
   DriveView(Board& board, Health& health, double rate_hz, bool bytes_stay, const std::string& camera = "");
 
   void message(const std::string& channel, const std::string& type, const BusMessage& message, int64_t now_us) override;
@@ -42,9 +42,9 @@ class DriveView : public MonitorListener {
     bool pinned = false;
   };
 
-  void pin(const PoseWatch& watch, const std::string& judged);
-  [[nodiscard]] std::optional<Placed> placed(const PoseWatch& watch) const;
-  [[nodiscard]] std::optional<Eigen::Vector2d> error(const PoseWatch& watch) const;  ///< m horizontal, rad
+  void pin(const PoseMonitor& monitor, const std::string& judged);
+  [[nodiscard]] std::optional<Placed> placed(const PoseMonitor& monitor) const;
+  [[nodiscard]] std::optional<Eigen::Vector2d> error(const PoseMonitor& monitor) const;  ///< m horizontal, rad
   void keep_picture(const BusMessage& message);
   [[nodiscard]] History::Row history_row(const HealthReport& report) const;
 
@@ -56,7 +56,7 @@ class DriveView : public MonitorListener {
   std::string camera_;  ///< whose pictures are shown
   int64_t framed_us_ = 0;
   std::map<std::string, Pin> pins_;
-  PoseWatch reference_;
+  PoseMonitor reference_;
   std::optional<fusion_state_t> fusion_;
   std::optional<vo_status_t> vo_status_;
   std::optional<vo_features2_t> features_;

@@ -67,10 +67,10 @@ TEST_CASE("the worst reason decides and comes first; a condition that gets worse
   REQUIRE(alarms.reasons().size() == 2);
   CHECK(alarms.reasons().front().key == "dead");
   CHECK(alarms.verdict() == Verdict::kDoNotUse);
-  Condition graver = kLate;
-  graver.verdict = Verdict::kDoNotUse;
+  Condition severer = kLate;
+  severer.verdict = Verdict::kDoNotUse;
   for (int i = 3; i <= 12; ++i) alarms.update(i * kTenth, {kLate});
   CHECK(alarms.verdict() == Verdict::kDegraded);
-  CHECK(alarms.update(13 * kTenth, {graver}));
+  CHECK(alarms.update(13 * kTenth, {severer}));
   CHECK(alarms.verdict() == Verdict::kDoNotUse);
 }

@@ -16,13 +16,13 @@ bool faulty(double t) { return t >= kFault && t < kMended; }
 using Change = std::function<void(PoseFacts&)>;
 
 /// The first decision at which `key` was among the reasons, with `change` made to `channel` from 10 to 15 s.
-double told(SmallCar& car, const std::string& channel, const Change& change, const std::string& key) {
+double reported(SmallCar& car, const std::string& channel, const Change& change, const std::string& key) {
   car.pose = [=](const std::string& name, double t, PoseFacts& facts) {
     if (name == channel && faulty(t)) change(facts);
   };
   car.drive(0.0, kFault);
   REQUIRE(car.health.verdict() == Verdict::kOk);
-  return car.told(key, kFault, kMended);
+  return car.reported(key, kFault, kMended);
 }
 
 }  // namespace
@@ -33,12 +33,12 @@ TEST_CASE("an invalid judged pose is not to be used, a coasting one is degraded"
     f.odometry.validity = Validity::kInvalid;
     f.reason = "no clock";
   };
-  CHECK(told(car, "POSE_FUSED", invalid, "pose.POSE_FUSED.invalid") <= kFault + 0.3);
+  CHECK(reported(car, "POSE_FUSED", invalid, "pose.POSE_FUSED.invalid") <= kFault + 0.3);
   CHECK(car.health.verdict() == Verdict::kDoNotUse);
   CHECK_THAT(car.reasons(), Catch::Contains("POSE_FUSED is invalid: no clock"));
   SmallCar coasting;
   const Change coast = [](PoseFacts& f) { f.odometry.validity = Validity::kCoasting; };
-  CHECK(told(coasting, "POSE_FUSED", coast, "pose.POSE_FUSED.coasting") <= kFault + 0.3);
+  CHECK(reported(coasting, "POSE_FUSED", coast, "pose.POSE_FUSED.coasting") <= kFault + 0.3);
   CHECK(coasting.health.verdict() == Verdict::kDegraded);
   coasting.drive(kMended, kMended + 1.0);
   CHECK(coasting.health.verdict() == Verdict::kOk);
@@ -47,7 +47,7 @@ TEST_CASE("an invalid judged pose is not to be used, a coasting one is degraded"
 TEST_CASE("an estimate that is not judged and invalid degrades; one that never worked does nothing") {
   SmallCar car;
   const Change invalid = [](PoseFacts& f) { f.odometry.validity = Validity::kInvalid; };
-  CHECK(told(car, "POSE_INS", invalid, "pose.POSE_INS.invalid") > 0.0);
+  CHECK(reported(car, "POSE_INS", invalid, "pose.POSE_INS.invalid") > 0.0);
   CHECK(car.health.verdict() == Verdict::kDegraded);
   SmallCar without;
   without.pose = [&](const std::string& name, double, PoseFacts& f) {
@@ -59,12 +59,12 @@ TEST_CASE("an estimate that is not judged and invalid degrades; one that never w
 
 TEST_CASE("numbers that are none and variances below zero are not to be used") {
   SmallCar nan;
-  CHECK(told(
+  CHECK(reported(
             nan, "POSE_FUSED", [](PoseFacts& f) { f.odometry.T_frame_vehicle.p.x() = std::nan(""); },
             "pose.POSE_FUSED.not_finite") <= kFault + 0.3);
   CHECK(nan.health.verdict() == Verdict::kDoNotUse);
   SmallCar negative;
-  CHECK(told(
+  CHECK(reported(
             negative, "POSE_FUSED", [](PoseFacts& f) { f.odometry.cov_pose(0, 0) = -1.0; },
             "pose.POSE_FUSED.covariance") <= kFault + 0.3);
 }
@@ -111,7 +111,7 @@ TEST_CASE("a jump that nobody announced is not to be used; an announced one is t
     car.drive(0.0, kFault);
     REQUIRE(car.health.verdict() == Verdict::kOk);
     const std::string key = announced ? "pose.POSE_FUSED.reset" : "pose.POSE_FUSED.jump";
-    CHECK(car.told(key, kFault, kFault + 0.8) > 0.0);
+    CHECK(car.reported(key, kFault, kFault + 0.8) > 0.0);
     CHECK(car.health.verdict() == (announced ? Verdict::kDegraded : Verdict::kDoNotUse));
     car.drive(kFault + 0.8, kFault + 3.0);
     CHECK(car.health.verdict() == Verdict::kOk);
@@ -120,7 +120,7 @@ TEST_CASE("a jump that nobody announced is not to be used; an announced one is t
 
 TEST_CASE("two absolute poses that are apart contradict each other, unless they say how unsure they are") {
   SmallCar car;
-  CHECK(told(
+  CHECK(reported(
             car, "POSE_INS", [](PoseFacts& f) { f.odometry.T_frame_vehicle.p.y() += 4.0; },
             "agreement.POSE_FUSED.POSE_INS.place") <= kFault + 1.0);
   SmallCar unsure;
@@ -128,7 +128,7 @@ TEST_CASE("two absolute poses that are apart contradict each other, unless they 
     f.odometry.T_frame_vehicle.p.y() += 4.0;
     f.odometry.cov_pose *= 1e4;
   };
-  CHECK(told(unsure, "POSE_INS", wide, "agreement.POSE_FUSED.POSE_INS.place") < 0.0);
+  CHECK(reported(unsure, "POSE_INS", wide, "agreement.POSE_FUSED.POSE_INS.place") < 0.0);
 }
 
 TEST_CASE("a frame of its own hides the place, not the motion") {
@@ -144,7 +144,7 @@ TEST_CASE("a frame of its own hides the place, not the motion") {
       if (t >= kFault) f.odometry.velocity *= scale;
     };
     car.drive(0.0, kFault);
-    return car.told("agreement.POSE_FUSED.POSE_INS.motion", kFault, kMended);
+    return car.reported("agreement.POSE_FUSED.POSE_INS.motion", kFault, kMended);
   };
   CHECK(contradicts(1.0) < 0.0);
   CHECK(contradicts(1.05) < 0.0);
@@ -189,19 +189,19 @@ TEST_CASE("innovations: honest ones pass, ten times too large ones and refused o
 }
 
 TEST_CASE("the mean of honest innovations is one, and the window forgets") {
-  NisWatch watch("x", ConsistencyLimits{});
-  for (int i = 0; i < 100; ++i) watch.seen(test::at(0.01 * i), 2.0, 2, true);
-  CHECK(watch.report(test::at(1.0)).ratio == Approx(1.0));
-  CHECK(watch.report(test::at(1.0)).used == 100);
-  for (int i = 0; i < 100; ++i) watch.seen(test::at(5.0 + 0.01 * i), 8.0, 2, true);
-  CHECK(watch.report(test::at(6.0)).ratio == Approx(4.0));
-  CHECK(watch.report(test::at(30.0)).used == 0);
+  NisMonitor monitor("x", ConsistencyLimits{});
+  for (int i = 0; i < 100; ++i) monitor.add(test::at(0.01 * i), 2.0, 2, true);
+  CHECK(monitor.report(test::at(1.0)).ratio == Approx(1.0));
+  CHECK(monitor.report(test::at(1.0)).used == 100);
+  for (int i = 0; i < 100; ++i) monitor.add(test::at(5.0 + 0.01 * i), 8.0, 2, true);
+  CHECK(monitor.report(test::at(6.0)).ratio == Approx(4.0));
+  CHECK(monitor.report(test::at(30.0)).used == 0);
 }
 
 TEST_CASE("what is refused has no say in the mean of the innovations") {
-  NisWatch watch("x", ConsistencyLimits{});
-  for (int i = 0; i < 40; ++i) watch.seen(test::at(0.01 * i), i % 4 == 0 ? 100.0 : 3.0, 2, i % 4 != 0);
-  const NisReport report = watch.report(test::at(0.4));
+  NisMonitor monitor("x", ConsistencyLimits{});
+  for (int i = 0; i < 40; ++i) monitor.add(test::at(0.01 * i), i % 4 == 0 ? 100.0 : 3.0, 2, i % 4 != 0);
+  const NisReport report = monitor.report(test::at(0.4));
   CHECK(report.used == 30);
   CHECK(report.refused == 10);
   CHECK(report.ratio == Approx(1.5));
@@ -210,14 +210,14 @@ TEST_CASE("what is refused has no say in the mean of the innovations") {
 TEST_CASE("refusals are over once a source is used again, or has fallen silent; those that go on are not") {
   // 10 Hz, refused for 3 s; then accepted, silent, or refused every second time.
   const auto refused_until = [](const std::function<std::optional<bool>(int)>& later) {
-    NisWatch watch("POSE_VO in FUSION", ConsistencyLimits{});
-    for (int i = 0; i < 30; ++i) watch.seen(test::at(0.1 * i), 30.0, 3, false);
+    NisMonitor monitor("POSE_VO in FUSION", ConsistencyLimits{});
+    for (int i = 0; i < 30; ++i) monitor.add(test::at(0.1 * i), 30.0, 3, false);
     double last = 0.0;
     for (int i = 30; i < 60; ++i) {
       if (const std::optional<bool> accepted = later(i))
-        watch.seen(test::at(0.1 * i), *accepted ? 1.0 : 30.0, 3, *accepted);
+        monitor.add(test::at(0.1 * i), *accepted ? 1.0 : 30.0, 3, *accepted);
       std::vector<Condition> conditions;
-      watch.judge(test::at(0.1 * i + 0.01), conditions);
+      monitor.check(test::at(0.1 * i + 0.01), conditions);
       if (!conditions.empty()) last = 0.1 * i;
     }
     return last;
@@ -228,7 +228,7 @@ TEST_CASE("refusals are over once a source is used again, or has fallen silent; 
 }
 
 TEST_CASE("refusals before a source's reset are not held against it; without a reset, or behind another's, they are") {
-  const auto told_until = [](const std::string& resets) {
+  const auto reported_until = [](const std::string& resets) {
     SmallCar car;
     car.tick = [&](double t) {
       const int i = static_cast<int>(std::lround(t * 100.0));
@@ -245,26 +245,26 @@ TEST_CASE("refusals before a source's reset are not held against it; without a r
     });
     return last;
   };
-  CHECK(told_until("POSE_INS") < kMended + 0.45);
-  CHECK(told_until("") > kMended + 0.8);
-  CHECK(told_until("POSE_FUSED") > kMended + 0.8);
+  CHECK(reported_until("POSE_INS") < kMended + 0.45);
+  CHECK(reported_until("") > kMended + 0.8);
+  CHECK(reported_until("POSE_FUSED") > kMended + 0.8);
 }
 
 TEST_CASE("a source that fits again without being used is no longer told; one that errs now and then is") {
   // 10 Hz, on probation: nothing is used, and every fifth contradicts the estimate, until `fits_from_s`.
-  const auto told_until = [](double fits_from_s) {
-    NisWatch watch("POSE_VO in FUSION", ConsistencyLimits{});
+  const auto reported_until = [](double fits_from_s) {
+    NisMonitor monitor("POSE_VO in FUSION", ConsistencyLimits{});
     double last = 0.0;
     for (int i = 0; i < 60; ++i) {
       const double t = 0.1 * i;
-      watch.seen(test::at(t), i % 5 == 0 && t < fits_from_s ? 30.0 : 1.0, 3, false);
+      monitor.add(test::at(t), i % 5 == 0 && t < fits_from_s ? 30.0 : 1.0, 3, false);
       std::vector<Condition> conditions;
-      watch.judge(test::at(t + 0.01), conditions);
+      monitor.check(test::at(t + 0.01), conditions);
       if (!conditions.empty()) last = t;
     }
     return last;
   };
-  CHECK(told_until(3.0) < 3.05);  // the last that did not fit came at 2.5 s
-  CHECK(told_until(3.0) > 2.5);
-  CHECK(told_until(9.0) > 5.8);
+  CHECK(reported_until(3.0) < 3.05);  // the last that did not fit came at 2.5 s
+  CHECK(reported_until(3.0) > 2.5);
+  CHECK(reported_until(9.0) > 5.8);
 }

@@ -17,10 +17,10 @@ void check_told(SmallCar& car, const std::string& key, Verdict verdict) {
   car.drive(0.0, kFault);
   INFO(car.reasons());
   REQUIRE(car.health.verdict() == Verdict::kOk);
-  const double told = car.told(key, kFault, kMended);
-  INFO(key << " told at " << told << "\n" << car.reasons());
-  CHECK(told >= kFault);
-  CHECK(told <= kFault + 1.0);
+  const double reported = car.reported(key, kFault, kMended);
+  INFO(key << " told at " << reported << "\n" << car.reasons());
+  CHECK(reported >= kFault);
+  CHECK(reported <= kFault + 1.0);
   Verdict worst = Verdict::kOk;
   car.drive(kMended, kMended + 0.2, [&](double) { worst = std::max(worst, car.health.verdict()); });
   CHECK(worst == verdict);
@@ -81,20 +81,20 @@ TEST_CASE("a sensor at half its rate") {
   };
   car.drive(0.0, kFault);
   REQUIRE(car.health.verdict() == Verdict::kOk);
-  CHECK(car.told("channel.IMU.slow", kFault, kMended) > kFault);
+  CHECK(car.reported("channel.IMU.slow", kFault, kMended) > kFault);
 }
 
 TEST_CASE("a burst is no new rate, a rate that stays is") {
   for (const double burst_s : {2.0, 8.0}) {
-    ChannelWatch watch("VO_STATUS", ChannelLimits{}, std::nullopt);
+    ChannelMonitor monitor("VO_STATUS", ChannelLimits{}, std::nullopt);
     bool slow = false;
     int64_t seq = 0;
     for (int i = 0; i < 3000; ++i) {
       const double t = 0.01 * i;
       const bool burst = t >= 10.0 && t < 10.0 + burst_s;
-      if (burst || i % 10 == 0) watch.arrived({test::at(t), test::at(t), 1, seq++, 100, std::nullopt});
+      if (burst || i % 10 == 0) monitor.arrived({test::at(t), test::at(t), 1, seq++, 100, std::nullopt});
       std::vector<Condition> conditions;
-      if (i % 10 == 0) watch.judge(test::at(t), 0, 0, Verdict::kDegraded, conditions);
+      if (i % 10 == 0) monitor.check(test::at(t), 0, 0, Verdict::kDegraded, conditions);
       slow = slow || (t > 25.0 && !conditions.empty());
     }
     CHECK(slow == (burst_s > 5.0));
@@ -117,12 +117,12 @@ TEST_CASE("stamps: late, ahead, jumping") {
   SECTION("late") {
     SmallCar car = shifted(-0.45);
     car.drive(0.0, kFault);
-    CHECK(car.told("channel.GNSS.late", kFault, kMended) > 0.0);
+    CHECK(car.reported("channel.GNSS.late", kFault, kMended) > 0.0);
   }
   SECTION("ahead") {
     SmallCar car = shifted(0.3);
     car.drive(0.0, kFault);
-    CHECK(car.told("channel.GNSS.ahead", kFault, kMended) > 0.0);
+    CHECK(car.reported("channel.GNSS.ahead", kFault, kMended) > 0.0);
   }
   SECTION("a little late is no fault") {
     SmallCar car = shifted(-0.15);
@@ -139,7 +139,7 @@ TEST_CASE("a drive that is played again years later is judged the same") {
   CHECK(car.health.verdict() == Verdict::kOk);
   CHECK(car.health.report().lag_s == Approx(static_cast<double>(car.lag_us) * 1e-6).margin(0.1));
   car.arrival = [](const std::string& channel, double t, Arrival&) { return channel != "GNSS" || !faulty(t); };
-  CHECK(car.told("channel.GNSS.silent", kFault, kMended) < kFault + 1.0);
+  CHECK(car.reported("channel.GNSS.silent", kFault, kMended) < kFault + 1.0);
 }
 
 TEST_CASE("channels that were forged for a moment do not set the time of the others") {
@@ -191,7 +191,7 @@ TEST_CASE("one restart of a publisher is no second publisher") {
   SmallCar car;
   car.drive(0.0, kFault);
   car.run = 2;
-  CHECK(car.told("channel.IMU.two_publishers", kFault, kMended) < 0.0);
+  CHECK(car.reported("channel.IMU.two_publishers", kFault, kMended) < 0.0);
   CHECK(car.health.verdict() == Verdict::kOk);
   CHECK(car.health.report().processes.front().restarts == 1);
 }
@@ -200,37 +200,37 @@ TEST_CASE("a dead process is told by its silence, a stopped one by its word") {
   SmallCar car;
   car.process = [](double t) { return !faulty(t); };
   car.drive(0.0, kFault);
-  const double told = car.told("process.imm_fusion.silent", kFault, kMended);
-  CHECK(told > kFault);
-  CHECK(told < kFault + 2.0);  // it beats once a second, the last time at 9 s
+  const double reported = car.reported("process.imm_fusion.silent", kFault, kMended);
+  CHECK(reported > kFault);
+  CHECK(reported < kFault + 2.0);  // it beats once a second, the last time at 9 s
 }
 
 TEST_CASE("a process that beats fast is missed soon, a slow one later; a restart is told") {
   for (const int64_t period_us : {250'000, 1'000'000}) {
-    ProcessWatch watch("recorder", ProcessLimits{});
-    const auto told = [&](int64_t now_us) {
+    ProcessMonitor monitor("recorder", ProcessLimits{});
+    const auto reported = [&](int64_t now_us) {
       std::vector<Condition> conditions;
-      watch.judge(now_us, 0, conditions);
+      monitor.check(now_us, 0, conditions);
       return conditions.empty() ? "" : conditions.front().key;
     };
     HeartbeatFacts beat;
     beat.run = 1;
     beat.state = ProcessState::kRunning;
     int64_t last_us = 0;
-    for (int i = 0; i < 20; ++i) watch.heartbeat(last_us = test::at(0.0) + i * period_us, beat);
-    CHECK(told(last_us + 5 * period_us / 2 - 1) == "");
-    CHECK(told(last_us + 5 * period_us / 2 + 1) == "process.recorder.silent");
+    for (int i = 0; i < 20; ++i) monitor.heartbeat(last_us = test::at(0.0) + i * period_us, beat);
+    CHECK(reported(last_us + 5 * period_us / 2 - 1) == "");
+    CHECK(reported(last_us + 5 * period_us / 2 + 1) == "process.recorder.silent");
     beat.run = 2;
-    watch.heartbeat(last_us += 3 * period_us, beat);
-    CHECK(told(last_us + 100'000) == "process.recorder.restarted");
-    CHECK(told(last_us + 1'100'000) == "");
+    monitor.heartbeat(last_us += 3 * period_us, beat);
+    CHECK(reported(last_us + 100'000) == "process.recorder.restarted");
+    CHECK(reported(last_us + 1'100'000) == "");
   }
 }
 
 TEST_CASE("what a heartbeat says of its process: state, processor, memory, queue, lost datagrams") {
   const ProcessLimits limits;
-  const auto told = [&](const std::function<void(HeartbeatFacts&)>& change) {
-    ProcessWatch watch("imm_fusion", limits, true);
+  const auto reported = [&](const std::function<void(HeartbeatFacts&)>& change) {
+    ProcessMonitor monitor("imm_fusion", limits, true);
     HeartbeatFacts beat;
     beat.run = 1;
     beat.state = ProcessState::kRunning;
@@ -238,31 +238,31 @@ TEST_CASE("what a heartbeat says of its process: state, processor, memory, queue
     beat.rss_bytes = 100 << 20;
     beat.queue_age_s = 0.9 * limits.queue_age;
     beat.kernel_drops = 5;  // before the monitor listened
-    watch.heartbeat(test::at(0.0), beat);
+    monitor.heartbeat(test::at(0.0), beat);
     change(beat);
-    watch.heartbeat(test::at(1.0), beat);
+    monitor.heartbeat(test::at(1.0), beat);
     std::vector<Condition> conditions;
-    watch.judge(test::at(1.1), 0, conditions);
+    monitor.check(test::at(1.1), 0, conditions);
     std::string all;
     for (const Condition& c : conditions) all += c.key + ": " + c.text + "\n";
     return all;
   };
-  CHECK(told([](HeartbeatFacts&) {}).empty());
-  CHECK(told([](HeartbeatFacts& b) { b.cpu_share = 0.97; }) ==
+  CHECK(reported([](HeartbeatFacts&) {}).empty());
+  CHECK(reported([](HeartbeatFacts& b) { b.cpu_share = 0.97; }) ==
         "process.imm_fusion.cpu: imm_fusion takes 97 % of a processor core\n");
-  CHECK(told([](HeartbeatFacts& b) { b.rss_bytes = int64_t{5} << 30; }) ==
+  CHECK(reported([](HeartbeatFacts& b) { b.rss_bytes = int64_t{5} << 30; }) ==
         "process.imm_fusion.memory: imm_fusion holds 5120 MiB\n");
-  CHECK(told([](HeartbeatFacts& b) {
+  CHECK(reported([](HeartbeatFacts& b) {
           b.queue_age_s = 0.7;
           b.queue_channel = "POSE_VO";
         }) == "process.imm_fusion.behind: imm_fusion is behind: POSE_VO waits 0.7 s for it\n");
-  CHECK(told([](HeartbeatFacts& b) { b.kernel_drops = 12; }) ==
+  CHECK(reported([](HeartbeatFacts& b) { b.kernel_drops = 12; }) ==
         "process.imm_fusion.kernel_drops: imm_fusion lost 7 datagrams: the kernel had no room for them\n");
-  CHECK(told([](HeartbeatFacts& b) {
+  CHECK(reported([](HeartbeatFacts& b) {
           b.state = ProcessState::kNoClock;
           b.reason = "no newer sample on POSE_INS";
         }) == "process.imm_fusion.no_clock: imm_fusion stands still: no newer sample on POSE_INS\n");
-  CHECK(told([](HeartbeatFacts& b) {
+  CHECK(reported([](HeartbeatFacts& b) {
           b.state = ProcessState::kDegraded;
           b.reason = "the network did not take 7 messages";
         }) == "process.imm_fusion.degraded: imm_fusion says: the network did not take 7 messages\n");
@@ -270,35 +270,35 @@ TEST_CASE("what a heartbeat says of its process: state, processor, memory, queue
 
 TEST_CASE("what spoke only once, as a forger does, is not missed for good; what is expected is") {
   for (const bool expected : {false, true}) {
-    ProcessWatch watch("vo_tracker", ProcessLimits{}, expected);
-    for (const double t : {0.0, 0.01, 0.02, 0.03}) watch.heartbeat(test::at(t), {});
+    ProcessMonitor monitor("vo_tracker", ProcessLimits{}, expected);
+    for (const double t : {0.0, 0.01, 0.02, 0.03}) monitor.heartbeat(test::at(t), {});
     std::vector<Condition> conditions;
-    watch.judge(test::at(20.0), 0, conditions);
+    monitor.check(test::at(20.0), 0, conditions);
     CHECK(conditions.size() == (expected ? 1 : 0));
   }
-  ChannelWatch watch("CAMERA_LEFT", ChannelLimits{}, std::nullopt);
+  ChannelMonitor monitor("CAMERA_LEFT", ChannelLimits{}, std::nullopt);
   const auto late = [&](double now_s) {
     std::vector<Condition> conditions;
-    watch.judge(test::at(now_s), 0, 0, Verdict::kDegraded, conditions);
+    monitor.check(test::at(now_s), 0, 0, Verdict::kDegraded, conditions);
     return !conditions.empty();
   };
-  watch.arrived({test::at(10.0), test::at(-3600.0), 1, 1, 100, std::nullopt});
+  monitor.arrived({test::at(10.0), test::at(-3600.0), 1, 1, 100, std::nullopt});
   CHECK(late(10.5));
   CHECK_FALSE(late(11.5));
 }
 
 TEST_CASE("a slow sensor is missed soon after it was due, unless it comes irregularly") {
   for (const int64_t scatter_us : {0, 200'000}) {
-    ChannelWatch watch("GNSS", ChannelLimits{}, 1.0);
+    ChannelMonitor monitor("GNSS", ChannelLimits{}, 1.0);
     const auto silent = [&](int64_t now_us) {
       std::vector<Condition> conditions;
-      watch.judge(now_us, 0, 0, Verdict::kDegraded, conditions);
+      monitor.check(now_us, 0, 0, Verdict::kDegraded, conditions);
       return !conditions.empty() && conditions.front().key == "channel.GNSS.silent";
     };
     int64_t now_us = 0;
     for (int i = 0; i < 20; ++i) {
       now_us = test::at(i) + (i % 2) * scatter_us;
-      watch.arrived({now_us, test::at(i), 1, i, 100, std::nullopt});
+      monitor.arrived({now_us, test::at(i), 1, i, 100, std::nullopt});
     }
     CHECK_FALSE(silent(now_us + 1'250'000));
     CHECK(silent(now_us + 1'350'000) == (scatter_us == 0));
@@ -319,7 +319,7 @@ TEST_CASE("measurements refused one and all are told before they are most of the
       single.health.measurement("GNSS position in INS", test::at(t), 30.0, 3, t < kFault || t > kFault + 0.35);
     }
   };
-  CHECK(single.told("refused.GNSS position in INS", 0.0, kMended) < 0.0);  // two in a row are none yet
+  CHECK(single.reported("refused.GNSS position in INS", 0.0, kMended) < 0.0);  // two in a row are none yet
 
   // A fast source: a quarter of a second of refusals is told, a fifth is a pothole.
   for (const double refused_s : {0.2, 0.4}) {
@@ -330,9 +330,9 @@ TEST_CASE("measurements refused one and all are told before they are most of the
       }
     };
     fast.drive(0.0, kFault);
-    const double told = fast.told("refused.Wheel speed in INS", kFault, kMended);
-    CHECK((told > 0.0) == (refused_s > 0.3));
-    CHECK(told < kFault + 0.5);
+    const double reported = fast.reported("refused.Wheel speed in INS", kFault, kMended);
+    CHECK((reported > 0.0) == (refused_s > 0.3));
+    CHECK(reported < kFault + 0.5);
   }
 }
 
@@ -365,7 +365,7 @@ TEST_CASE("disk, clock, the monitor's own losses") {
     car.health.host(test::at(t), host);
   };
   check_told(car, "host.disk", Verdict::kDegraded);
-  CHECK(car.told("host.clock", 30.0, 31.0) < 0.0);
+  CHECK(car.reported("host.clock", 30.0, 31.0) < 0.0);
   SmallCar again;
   again.tick = [&](double t) {
     host.clock_step_s = faulty(t) ? -3.2 : 0.0;

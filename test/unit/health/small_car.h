@@ -50,14 +50,14 @@ struct SmallCar {
     health.pose(channel, a.now_us, facts);
   }
 
-  /// Until `to` seconds; `watch` sees every decision.
+  /// Until `to` seconds; `monitor` sees every decision.
   void drive(
-      double from, double to, const std::function<void(double t)>& watch = [](double) {}) {
+      double from, double to, const std::function<void(double t)>& monitor = [](double) {}) {
     for (int i = static_cast<int>(std::lround(from * 100)); i < std::lround(to * 100); ++i) {
       const double t = i * 0.01;
       while (const auto due = health.next_decision(at(t))) {
         health.decide(*due);
-        watch(t);
+        monitor(t);
       }
       tick(t);
       send("IMU", t, i);
@@ -74,7 +74,7 @@ struct SmallCar {
   }
 
   /// When a reason with this key first stood among the reasons in [from, to); negative: never.
-  double told(const std::string& key, double from, double to) {
+  double reported(const std::string& key, double from, double to) {
     double when = -1.0;
     drive(from, to, [&](double t) {
       for (const Condition& reason : health.report().reasons) {

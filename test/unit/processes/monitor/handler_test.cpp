@@ -176,21 +176,21 @@ TEST_CASE("of two monitors the younger is silent, and speaks when the older is g
   test::OutageBus bus;
   HealthPublisher publisher(bus, 0.5, true);
   HealthReport report;
-  int heard = 0;
-  bus.subscribe("HEALTH", [&heard](const BusMessage&) { ++heard; });
+  int received = 0;
+  bus.subscribe("HEALTH", [&received](const BusMessage&) { ++received; });
   const auto published = [&](int64_t after_us) {
-    heard = 0;
+    received = 0;
     report.now_us = kStart_us + after_us;
     publisher.decided(report, true);
     while (bus.handle(std::chrono::milliseconds(0))) continue;
-    return heard == 1;
+    return received == 1;
   };
   const auto hear = [&](int64_t run, int64_t after_us) {
     health_t other{};
     other.utime = kStart_us + after_us;
     other.run = run;
     const std::vector<uint8_t> bytes = encode(other);
-    publisher.heard({"HEALTH", bytes, other.utime}, other.utime);
+    publisher.received({"HEALTH", bytes, other.utime}, other.utime);
   };
   CHECK_FALSE(published(0));
   CHECK_FALSE(published(1'000'000));

@@ -1,4 +1,4 @@
-#include "health/channel_watch.h"
+#include "health/channel_monitor.h"
 
 #include <fmt/format.h>
 
@@ -14,12 +14,12 @@ namespace {
 constexpr int64_t kWindow_us = 1'000'000;
 constexpr std::size_t kWindowMessages = 256;
 /// Slow channels are described by their last few messages, up to this age.
-constexpr std::size_t kLeastMessages = 6;
-constexpr int64_t kOldest_us = 12'000'000;
+constexpr std::size_t kMinMessages = 6;
+constexpr int64_t kMaxAge_us = 12'000'000;
 /// Share of the intervals that must lie near their median before a channel counts as regular.
 constexpr double kRegularShare = 0.7;
 constexpr double kNear = 0.5;
-constexpr double kStale = 1.0;    // s after which the stamps of a channel without a rate say nothing any more
+constexpr double kStale = 1.0;    // s after which the stamps of a channel without a rate are not used any more
 constexpr double kScatter = 3.0;  // standard deviations of the arrival that a slow channel may be overdue
 /// A rate this much above the expected one is the new expectation.
 constexpr double kFaster = 1.2;
@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, 10> kEventPrefixes = {
     "LEDGER_", "CONFIG_", "STATE_", "START_", "HORIZON_", "HEARTBEAT_", "RAW_", "HEALTH", "VO_RESTART", "AIDING_"};
 constexpr int64_t kTwoPublishers = 3;
 /// Of one gap; a forged number must not overflow the sum.
-constexpr int64_t kMostLost = 1'000'000'000;
+constexpr int64_t kMaxLost = 1'000'000'000;
 
 double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
 
@@ -41,27 +41,27 @@ std::string per_second(double rate_hz) { return fmt::format("{:.3g} per second",
 
 }  // namespace
 
-bool comes_at_a_rate(const std::string& channel) {
+bool is_periodic(const std::string& channel) {
   return std::none_of(kEventPrefixes.begin(), kEventPrefixes.end(),
                       [&](std::string_view prefix) { return channel.starts_with(prefix); });
 }
 
-ChannelWatch::ChannelWatch(const std::string& name, const ChannelLimits& limits, std::optional<double> expected_hz)
+ChannelMonitor::ChannelMonitor(const std::string& name, const ChannelLimits& limits, std::optional<double> expected_hz)
     : name_(name),
       limits_(limits),
-      judged_(comes_at_a_rate(name)),
+      periodic_(is_periodic(name)),
       configured_(expected_hz.has_value()),
       expected_hz_(expected_hz) {}
 
-void ChannelWatch::arrived(const Arrival& arrival) {
-  if (received_ == 0 || silent(arrival.now_us)) window_.clear();  // a rate over a silence would tell of neither side
+void ChannelMonitor::arrived(const Arrival& arrival) {
+  if (received_ == 0 || silent(arrival.now_us)) window_.clear();  // a rate over a silence describes neither side
   count_sequence(arrival);
-  watch_stamps(arrival);
+  detect_stamp_jump(arrival);
   ++received_;
   window_.push_back({arrival.now_us, arrival.utime});
   while (window_.size() > kWindowMessages ||
-         (window_.size() > kLeastMessages && arrival.now_us - window_.front().now_us > kWindow_us) ||
-         arrival.now_us - window_.front().now_us > kOldest_us) {
+         (window_.size() > kMinMessages && arrival.now_us - window_.front().now_us > kWindow_us) ||
+         arrival.now_us - window_.front().now_us > kMaxAge_us) {
     window_.pop_front();
   }
   if (!arrival.content || arrival.content != content_) {
@@ -72,9 +72,9 @@ void ChannelWatch::arrived(const Arrival& arrival) {
   ++content_messages_;
 }
 
-void ChannelWatch::count_sequence(const Arrival& arrival) {
+void ChannelMonitor::count_sequence(const Arrival& arrival) {
   if (received_ > 0 && arrival.run == run_) {
-    if (arrival.seq > seq_ + 1) lost_.add(arrival.now_us, std::min(arrival.seq - seq_ - 1, kMostLost));
+    if (arrival.seq > seq_ + 1) lost_.add(arrival.now_us, std::min(arrival.seq - seq_ - 1, kMaxLost));
     seq_ = std::max(seq_, arrival.seq);
     return;
   }
@@ -84,13 +84,13 @@ void ChannelWatch::count_sequence(const Arrival& arrival) {
   run_ = arrival.run;
   seq_ = arrival.seq;
   first_us_ = arrival.now_us;
-  learn_anew_ = true;  // a process that was configured anew may have another rate
+  relearn_rate_ = true;  // a process that was configured anew may have another rate
   window_.clear();
 }
 
-void ChannelWatch::watch_stamps(const Arrival& arrival) {
-  if (window_.empty() || !judged_) return;
-  const Seen& last = window_.back();
+void ChannelMonitor::detect_stamp_jump(const Arrival& arrival) {
+  if (window_.empty() || !periodic_) return;
+  const ArrivalTimes& last = window_.back();
   const double jump = seconds((arrival.utime - last.utime) - (arrival.now_us - last.now_us));
   if (std::abs(jump) <= limits_.stamp_jump) return;
   stamp_jumps_.add(arrival.now_us);
@@ -99,25 +99,25 @@ void ChannelWatch::watch_stamps(const Arrival& arrival) {
   window_.clear();
 }
 
-void ChannelWatch::undecodable(int64_t now_us, const std::string& why) {
+void ChannelMonitor::undecodable(int64_t now_us, const std::string& why) {
   undecodable_.add(now_us);
   why_undecodable_ = why;
 }
 
-std::optional<int64_t> ChannelWatch::lag_us() const {
-  if (window_.empty() || !judged_) return std::nullopt;
+std::optional<int64_t> ChannelMonitor::lag_us() const {
+  if (window_.empty() || !periodic_) return std::nullopt;
   std::vector<int64_t> lags;
-  for (const Seen& seen : window_) lags.push_back(seen.now_us - seen.utime);
+  for (const ArrivalTimes& arrival : window_) lags.push_back(arrival.now_us - arrival.utime);
   return median_of(lags);
 }
 
-bool ChannelWatch::is_fresh(int64_t now_us) const {
+bool ChannelMonitor::is_fresh(int64_t now_us) const {
   return !window_.empty() && seconds(now_us - window_.back().now_us) <= std::max(kStale, 1.5 * silent_after());
 }
 
 /// The rate that the stamps show, once they have shown it long and regularly enough.
-void ChannelWatch::learn(int64_t now_us) {
-  if (!judged_ || configured_ || window_.size() < kLeastMessages) return;
+void ChannelMonitor::learn_rate(int64_t now_us) {
+  if (!periodic_ || configured_ || window_.size() < kMinMessages) return;
   if (seconds(now_us - first_us_) < limits_.learn) return;
   std::vector<int64_t> intervals;
   for (std::size_t i = 1; i < window_.size(); ++i) intervals.push_back(window_[i].utime - window_[i - 1].utime);
@@ -128,7 +128,7 @@ void ChannelWatch::learn(int64_t now_us) {
   });
   if (static_cast<double>(regular) < kRegularShare * static_cast<double>(intervals.size())) return;
   const double rate = 1e6 / period;
-  if (!learn_anew_ && expected_hz_) {
+  if (!relearn_rate_ && expected_hz_) {
     // A burst is no new rate: what comes faster must have come so for as long as a rate takes to be known.
     if (rate <= kFaster * *expected_hz_) {
       faster_since_us_.reset();
@@ -139,29 +139,29 @@ void ChannelWatch::learn(int64_t now_us) {
   }
   faster_since_us_.reset();
   expected_hz_ = rate;
-  learn_anew_ = false;
+  relearn_rate_ = false;
 }
 
-double ChannelWatch::rate_hz(int64_t now_us) const {
+double ChannelMonitor::rate_hz(int64_t now_us) const {
   if (window_.size() < 2 || silent(now_us)) return 0.0;
   const int64_t span = window_.back().now_us - window_.front().now_us;
   return span > 0 ? static_cast<double>(window_.size() - 1) / seconds(span) : 0.0;
 }
 
-bool ChannelWatch::silent(int64_t now_us) const {
-  if (!judged_ || !expected_hz_ || window_.empty()) return false;
+bool ChannelMonitor::silent(int64_t now_us) const {
+  if (!periodic_ || !expected_hz_ || window_.empty()) return false;
   return seconds(now_us - window_.back().now_us) > silent_after();
 }
 
 /// 0: not known. A fast channel may miss a message or two; a slow one is missed soon after it was due.
-double ChannelWatch::silent_after() const {
+double ChannelMonitor::silent_after() const {
   if (!expected_hz_) return 0.0;
   const double period = 1.0 / *expected_hz_;
   const double due = period + std::max(limits_.silent_at_least, kScatter * jitter_s());
   return std::max(std::min(limits_.silent_periods * period, due), limits_.silent_at_least);
 }
 
-double ChannelWatch::jitter_s() const {
+double ChannelMonitor::jitter_s() const {
   if (window_.size() < 3) return 0.0;
   const double mean = seconds(window_.back().now_us - window_.front().now_us) / static_cast<double>(window_.size() - 1);
   double sum = 0.0;
@@ -171,14 +171,14 @@ double ChannelWatch::jitter_s() const {
   return std::sqrt(sum / static_cast<double>(window_.size() - 1));
 }
 
-Condition ChannelWatch::condition(const std::string& what, Verdict verdict, const std::string& text) const {
+Condition ChannelMonitor::condition(const std::string& what, Verdict verdict, const std::string& text) const {
   const bool estimate = name_.starts_with("POSE_");
   return {"channel." + name_ + "." + what, verdict, estimate ? kRankPose : kRankSensor, name_ + " " + text};
 }
 
-void ChannelWatch::judge(int64_t now_us, int64_t start_us, int64_t lag_us, Verdict if_silent,
-                         std::vector<Condition>& out) {
-  learn(now_us);
+void ChannelMonitor::check(int64_t now_us, int64_t start_us, int64_t lag_us, Verdict if_silent,
+                           std::vector<Condition>& out) {
+  learn_rate(now_us);
   if (received_ == 0) {
     if (now_us < start_us) return;
     const std::string wanted = expected_hz_ ? fmt::format(" ({} expected)", per_second(*expected_hz_)) : "";
@@ -188,25 +188,25 @@ void ChannelWatch::judge(int64_t now_us, int64_t start_us, int64_t lag_us, Verdi
                             fmt::format("is silent for {:.1f} s ({} expected)", seconds(now_us - window_.back().now_us),
                                         per_second(*expected_hz_))));
   } else {
-    judge_rate(now_us, out);
-    judge_stamps(now_us, lag_us, out);
+    check_rate(now_us, out);
+    check_stamps(now_us, lag_us, out);
   }
-  judge_contents(now_us, out);
+  check_contents(now_us, out);
 }
 
-void ChannelWatch::judge_rate(int64_t now_us, std::vector<Condition>& out) const {
+void ChannelMonitor::check_rate(int64_t now_us, std::vector<Condition>& out) const {
   const double rate = rate_hz(now_us);
-  if (judged_ && expected_hz_ && window_.size() >= kLeastMessages && rate < limits_.slow_share * *expected_hz_) {
+  if (periodic_ && expected_hz_ && window_.size() >= kMinMessages && rate < limits_.slow_share * *expected_hz_) {
     out.push_back(condition("slow", Verdict::kDegraded,
                             fmt::format("comes {} instead of {:.3g}", per_second(rate), *expected_hz_)));
   }
-  if (judged_ && configured_ && window_.size() >= kLeastMessages && rate > limits_.fast_factor * *expected_hz_) {
+  if (periodic_ && configured_ && window_.size() >= kMinMessages && rate > limits_.fast_factor * *expected_hz_) {
     out.push_back(condition("fast", Verdict::kDegraded,
                             fmt::format("comes {} instead of {:.3g}", per_second(rate), *expected_hz_)));
   }
   const int64_t lost = lost_.within(now_us);
   const double of = std::max(1.0, expected_hz_.value_or(rate));
-  if (judged_ && static_cast<double>(lost) > limits_.lost_share * of) {
+  if (periodic_ && static_cast<double>(lost) > limits_.lost_share * of) {
     out.push_back(condition("lost", Verdict::kDegraded, fmt::format("lost {} messages within a second", lost)));
   }
   if (run_changes_.within(now_us) >= kTwoPublishers) {
@@ -214,7 +214,7 @@ void ChannelWatch::judge_rate(int64_t now_us, std::vector<Condition>& out) const
   }
 }
 
-void ChannelWatch::judge_stamps(int64_t now_us, int64_t lag_us, std::vector<Condition>& out) const {
+void ChannelMonitor::check_stamps(int64_t now_us, int64_t lag_us, std::vector<Condition>& out) const {
   if (stamp_jumps_.within(now_us) > 0) {
     out.push_back(
         condition("stamp_jump", Verdict::kDegraded, fmt::format("has stamps that jumped by {:+.1f} s", stamp_jump_s_)));
@@ -232,7 +232,7 @@ void ChannelWatch::judge_stamps(int64_t now_us, int64_t lag_us, std::vector<Cond
   }
 }
 
-void ChannelWatch::judge_contents(int64_t now_us, std::vector<Condition>& out) const {
+void ChannelMonitor::check_contents(int64_t now_us, std::vector<Condition>& out) const {
   if (const int64_t count = undecodable_.within(now_us); count > 0) {
     out.push_back(condition("undecodable", Verdict::kDegraded,
                             fmt::format("has {} messages that cannot be read: {}", count, why_undecodable_)));
@@ -246,7 +246,7 @@ void ChannelWatch::judge_contents(int64_t now_us, std::vector<Condition>& out) c
   }
 }
 
-ChannelReport ChannelWatch::report(int64_t now_us, int64_t lag_us) const {
+ChannelReport ChannelMonitor::report(int64_t now_us, int64_t lag_us) const {
   ChannelReport report;
   report.name = name_;
   report.expected_hz = expected_hz_;

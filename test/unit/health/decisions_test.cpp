@@ -22,15 +22,15 @@ TEST_CASE("decisions lie on tenths of a second that are over, each once, however
 }
 
 TEST_CASE("the rate of a channel is that of its messages, and nought once it is silent") {
-  ChannelWatch watch("GNSS", ChannelLimits{}, 10.0);
-  CHECK(watch.report(test::at(0.0), 0).rate_hz == 0.0);
-  for (int i = 0; i < 50; ++i) watch.arrived({test::at(0.1 * i), test::at(0.1 * i), 1, i, 100, std::nullopt});
-  CHECK(watch.report(test::at(4.95), 0).rate_hz == Approx(10.0).epsilon(0.02));
-  CHECK(watch.report(test::at(9.0), 0).rate_hz == 0.0);
+  ChannelMonitor monitor("GNSS", ChannelLimits{}, 10.0);
+  CHECK(monitor.report(test::at(0.0), 0).rate_hz == 0.0);
+  for (int i = 0; i < 50; ++i) monitor.arrived({test::at(0.1 * i), test::at(0.1 * i), 1, i, 100, std::nullopt});
+  CHECK(monitor.report(test::at(4.95), 0).rate_hz == Approx(10.0).epsilon(0.02));
+  CHECK(monitor.report(test::at(9.0), 0).rate_hz == 0.0);
 }
 
 TEST_CASE("two processes under one name are told from a restart; monitors may look side by side") {
-  const auto told = [](const std::string& process, int both) {
+  const auto reported = [](const std::string& process, int both) {
     Health health(HealthConfig{}, Expectations{});
     std::string all;
     HeartbeatFacts beat;
@@ -48,8 +48,8 @@ TEST_CASE("two processes under one name are told from a restart; monitors may lo
     }
     return all;
   };
-  CHECK(told("gnss_ins_ekf", 30) == "gnss_ins_ekf was started anew\n");
-  CHECK(told("gnss_ins_ekf", 100) ==
+  CHECK(reported("gnss_ins_ekf", 30) == "gnss_ins_ekf was started anew\n");
+  CHECK(reported("gnss_ins_ekf", 100) ==
         "gnss_ins_ekf was started anew\ngnss_ins_ekf runs twice at once: end one of the two\n");
-  CHECK(told("monitor", 100).empty());
+  CHECK(reported("monitor", 100).empty());
 }

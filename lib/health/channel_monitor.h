@@ -32,58 +32,57 @@ struct ChannelReport {
   std::optional<double> expected_hz;
   double jitter_s = 0.0;   ///< standard deviation of the time between two arrivals
   double latency_s = 0.0;  ///< median from stamp to arrival
-  double age_s = -1.0;     ///< since the newest arrival; -1: never heard
+  double age_s = -1.0;     ///< since the newest arrival; -1: none yet
   int64_t received = 0;
   int64_t lost = 0;
   int64_t undecodable = 0;
   bool silent = false;
 };
 
-class ChannelWatch {
+class ChannelMonitor {
  public:
-  ChannelWatch(const std::string& name, const ChannelLimits& limits, std::optional<double> expected_hz);
+  ChannelMonitor(const std::string& name, const ChannelLimits& limits, std::optional<double> expected_hz);
 
   void arrived(const Arrival& arrival);
   void undecodable(int64_t now_us, const std::string& why);
   /// A message in order whose values are no numbers, or impossible.
   void unusable(int64_t now_us) { unusable_.add(now_us); }
 
-  /// Median of arrival minus stamp; absent before the first arrival and for channels that are not judged.
+  /// Median of arrival minus stamp; absent before the first arrival and for channels that are not periodic.
   [[nodiscard]] std::optional<int64_t> lag_us() const;
-  /// Whether something came lately, so that its stamps still say something.
+  /// Whether something came lately, so that its stamps are still of use.
   [[nodiscard]] bool is_fresh(int64_t now_us) const;
 
   /// `start_us`: when what is expected should have appeared. `if_silent`: how bad it is when the channel falls silent.
-  void judge(int64_t now_us, int64_t start_us, int64_t lag_us, Verdict if_silent, std::vector<Condition>& out);
+  void check(int64_t now_us, int64_t start_us, int64_t lag_us, Verdict if_silent, std::vector<Condition>& out);
   [[nodiscard]] ChannelReport report(int64_t now_us, int64_t lag_us) const;
-  [[nodiscard]] bool heard() const { return received_ > 0; }
 
  private:
-  struct Seen {
+  struct ArrivalTimes {
     int64_t now_us = 0;
     int64_t utime = 0;
   };
 
   void count_sequence(const Arrival& arrival);
-  void watch_stamps(const Arrival& arrival);
-  void learn(int64_t now_us);
+  void detect_stamp_jump(const Arrival& arrival);
+  void learn_rate(int64_t now_us);
   [[nodiscard]] double rate_hz(int64_t now_us) const;
   [[nodiscard]] bool silent(int64_t now_us) const;
   [[nodiscard]] double silent_after() const;
   [[nodiscard]] double jitter_s() const;
   [[nodiscard]] Condition condition(const std::string& what, Verdict verdict, const std::string& text) const;
-  void judge_rate(int64_t now_us, std::vector<Condition>& out) const;
-  void judge_stamps(int64_t now_us, int64_t lag_us, std::vector<Condition>& out) const;
-  void judge_contents(int64_t now_us, std::vector<Condition>& out) const;
+  void check_rate(int64_t now_us, std::vector<Condition>& out) const;
+  void check_stamps(int64_t now_us, int64_t lag_us, std::vector<Condition>& out) const;
+  void check_contents(int64_t now_us, std::vector<Condition>& out) const;
 
   std::string name_;
   ChannelLimits limits_;
-  bool judged_;
+  bool periodic_;
   bool configured_;
   std::optional<double> expected_hz_;
-  bool learn_anew_ = true;
+  bool relearn_rate_ = true;
   std::optional<int64_t> faster_since_us_;  ///< than expected
-  std::deque<Seen> window_;
+  std::deque<ArrivalTimes> window_;
   int64_t first_us_ = 0;  ///< of the run
   int64_t run_ = 0, previous_run_ = 0, seq_ = 0;
   int64_t received_ = 0;
@@ -96,6 +95,6 @@ class ChannelWatch {
 };
 
 /// False for channels that come when something happens, not at a rate.
-bool comes_at_a_rate(const std::string& channel);
+bool is_periodic(const std::string& channel);
 
 }  // namespace roadfix

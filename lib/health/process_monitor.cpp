@@ -1,4 +1,4 @@
-#include "health/process_watch.h"
+#include "health/process_monitor.h"
 
 #include <fmt/format.h>
 
@@ -11,15 +11,15 @@ namespace {
 
 constexpr double kMebi = 1024.0 * 1024.0;
 constexpr std::size_t kIntervals = 5;
-constexpr double kLived = 2.0;    // s of heartbeats, after which an unexpected process is missed, too
-constexpr double kBeats = 2.5;    // intervals without a sign of life
-constexpr double kAtLeast = 0.5;  // s, however fast it beats
+constexpr double kEstablished = 2.0;         // s of heartbeats, after which an unexpected process is missed, too
+constexpr double kHeartbeatIntervals = 2.5;  // intervals without a heartbeat
+constexpr double kMinSilence = 0.5;          // s, however fast it beats
 
 double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
 
 }  // namespace
 
-void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
+void ProcessMonitor::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
   if (newest_ && newest_->run != facts.run) {
     change_run(now_us, facts.run);
   } else if (newest_ && facts.kernel_drops > newest_->kernel_drops) {
@@ -34,36 +34,37 @@ void ProcessWatch::heartbeat(int64_t now_us, const HeartbeatFacts& facts) {
   now_us_ = now_us;
 }
 
-/// One new run is a restart; going back and forth between two is two that live, both heard in every period.
-void ProcessWatch::change_run(int64_t now_us, int64_t run) {
+/// One new run is a restart; going back and forth between two is two that live, both beating in every period.
+void ProcessMonitor::change_run(int64_t now_us, int64_t run) {
   intervals_us_.clear();
-  const int64_t left = std::exchange(previous_run_, newest_->run);
+  const int64_t other = std::exchange(previous_run_, newest_->run);
   if (several_) return;
-  if (run == left) {
-    back_and_forth_.add(now_us);
+  if (run == other) {
+    run_alternations_.add(now_us);
   } else {
     ++restarts_;
     restarted_.add(now_us);
   }
 }
 
-/// A process that beats fast is missed soon: by the longest of its last intervals, so that an early one says nothing.
-double ProcessWatch::silent_after() const {
+/// A process that beats fast is missed soon: by the longest of its last intervals, so that an early one does not count.
+double ProcessMonitor::silent_after() const {
   if (intervals_us_.size() < kIntervals) return limits_.heartbeat;
   const double longest = seconds(*std::max_element(intervals_us_.begin(), intervals_us_.end()));
-  return std::clamp(kBeats * longest, std::min(kAtLeast, limits_.heartbeat), limits_.heartbeat);
+  return std::clamp(kHeartbeatIntervals * longest, std::min(kMinSilence, limits_.heartbeat), limits_.heartbeat);
 }
 
 /// A few heartbeats of a process that nobody expects may be forged, or of a test: it is not missed.
-bool ProcessWatch::silent(int64_t now_us) const {
-  return newest_ && (expected_ || seconds(now_us_ - first_us_) > kLived) && seconds(now_us - now_us_) > silent_after();
+bool ProcessMonitor::silent(int64_t now_us) const {
+  return newest_ && (expected_ || seconds(now_us_ - first_us_) > kEstablished) &&
+         seconds(now_us - now_us_) > silent_after();
 }
 
-Condition ProcessWatch::condition(const std::string& what, const std::string& text) const {
+Condition ProcessMonitor::condition(const std::string& what, const std::string& text) const {
   return {"process." + name_ + "." + what, Verdict::kDegraded, kRankProcess, name_ + " " + text};
 }
 
-void ProcessWatch::judge(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const {
+void ProcessMonitor::check(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const {
   if (!newest_) {
     if (now_us >= start_us) out.push_back(condition("missing", "has shown no sign of life"));
     return;
@@ -77,15 +78,15 @@ void ProcessWatch::judge(int64_t now_us, int64_t start_us, std::vector<Condition
         condition("silent", fmt::format("has shown no sign of life for {:.0f} s", seconds(now_us - now_us_))));
     return;
   }
-  if (back_and_forth_.within(now_us) > 0) out.push_back(condition("twice", "runs twice at once: end one of the two"));
+  if (run_alternations_.within(now_us) > 0) out.push_back(condition("twice", "runs twice at once: end one of the two"));
   if (restarted_.within(now_us) > 0) out.push_back(condition("restarted", "was started anew"));
   if (newest_->state == ProcessState::kNoClock)
     out.push_back(condition("no_clock", "stands still: " + newest_->reason));
   if (newest_->state == ProcessState::kDegraded) out.push_back(condition("degraded", "says: " + newest_->reason));
-  judge_load(now_us, out);
+  check_load(now_us, out);
 }
 
-void ProcessWatch::judge_load(int64_t now_us, std::vector<Condition>& out) const {
+void ProcessMonitor::check_load(int64_t now_us, std::vector<Condition>& out) const {
   const HeartbeatFacts& f = *newest_;
   if (f.cpu_share > limits_.cpu_share)
     out.push_back(condition("cpu", fmt::format("takes {:.0f} % of a processor core", 100.0 * f.cpu_share)));
@@ -98,7 +99,7 @@ void ProcessWatch::judge_load(int64_t now_us, std::vector<Condition>& out) const
     out.push_back(condition("kernel_drops", fmt::format("lost {} datagrams: the kernel had no room for them", drops)));
 }
 
-ProcessReport ProcessWatch::report(int64_t now_us) const {
+ProcessReport ProcessMonitor::report(int64_t now_us) const {
   ProcessReport report;
   report.name = name_;
   report.newest = newest_;

@@ -1,4 +1,4 @@
-#include "health/pose_watch.h"
+#include "health/pose_monitor.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr int64_t kKept_us = 12'000'000;
+constexpr int64_t kHistory_us = 12'000'000;
 constexpr int64_t kSpacing_us = 50'000;
 /// Two outputs further apart than this are not compared: the velocity between them is not known.
 constexpr int64_t kMaxStep_us = 500'000;
@@ -23,7 +23,7 @@ bool finite(const Odometry& o) {
 }
 
 /// A covariance that no estimate can have.
-bool impossible(const Odometry& o) { return o.cov_pose.diagonal().minCoeff() < 0.0; }
+bool has_negative_variance(const Odometry& o) { return o.cov_pose.diagonal().minCoeff() < 0.0; }
 
 double yaw_std(const Odometry& o) { return std::sqrt(std::max(0.0, o.cov_pose(5, 5))); }
 
@@ -37,20 +37,20 @@ HorizontalEllipse horizontal_ellipse(const Eigen::Matrix2d& covariance) {
           std::atan2(major.y(), major.x())};
 }
 
-bool PoseWatch::usable() const {
+bool PoseMonitor::usable() const {
   return newest_ && newest_->odometry.validity != Validity::kInvalid && finite(newest_->odometry);
 }
 
-void PoseWatch::seen(int64_t now_us, const PoseFacts& facts) {
-  watch_jumps(now_us, facts);
+void PoseMonitor::add(int64_t now_us, const PoseFacts& facts) {
+  detect_jump(now_us, facts);
   newest_ = facts;
   now_us_ = now_us;
   was_usable_ = was_usable_ || usable();
-  keep(facts);
+  store(facts);
 }
 
-/// Where the velocity says the estimate should be now, and how far off it is.
-void PoseWatch::watch_jumps(int64_t now_us, const PoseFacts& facts) {
+/// Compares the estimate with the place that its velocity predicts.
+void PoseMonitor::detect_jump(int64_t now_us, const PoseFacts& facts) {
   if (!newest_ || !usable() || facts.odometry.validity == Validity::kInvalid || !finite(facts.odometry) ||
       facts.run != newest_->run) {
     ++segment_;
@@ -66,23 +66,23 @@ void PoseWatch::watch_jumps(int64_t now_us, const PoseFacts& facts) {
   }
   if (b.t_us <= a.t_us || b.t_us - a.t_us > kMaxStep_us || !facts.metric) return;
   const Eigen::Vector3d mean = 0.5 * (a.T_frame_vehicle.q * a.velocity + b.T_frame_vehicle.q * b.velocity);
-  const double beside = (moved - mean * seconds_between(a.t_us, b.t_us)).norm();
-  if (beside <= limits_.jump) return;
+  const double deviation = (moved - mean * seconds_between(a.t_us, b.t_us)).norm();
+  if (deviation <= limits_.jump) return;
   jumps_.add(now_us);
-  jump_m_ = beside;
+  jump_m_ = deviation;
   ++segment_;
 }
 
-void PoseWatch::keep(const PoseFacts& facts) {
+void PoseMonitor::store(const PoseFacts& facts) {
   const Odometry& o = facts.odometry;
   if (!usable()) return;
   if (!track_.empty() && o.t_us < track_.back().t_us) track_.clear();  // the drive was begun again
   if (!track_.empty() && track_.back().segment == segment_ && o.t_us - track_.back().t_us < kSpacing_us) return;
   track_.push_back({o.t_us, o.T_frame_vehicle, o.cov_pose.topLeftCorner<2, 2>(), segment_});
-  while (o.t_us - track_.front().t_us > kKept_us) track_.pop_front();
+  while (o.t_us - track_.front().t_us > kHistory_us) track_.pop_front();
 }
 
-std::optional<PoseWatch::Point> PoseWatch::at(int64_t t_us) const {
+std::optional<PoseMonitor::Point> PoseMonitor::at(int64_t t_us) const {
   const auto after = std::lower_bound(track_.begin(), track_.end(), t_us,
                                       [](const Point& point, int64_t t) { return point.t_us < t; });
   if (after == track_.end()) return std::nullopt;
@@ -99,36 +99,36 @@ std::optional<PoseWatch::Point> PoseWatch::at(int64_t t_us) const {
   return point;
 }
 
-Condition PoseWatch::condition(const std::string& what, Verdict verdict, const std::string& text) const {
+Condition PoseMonitor::condition(const std::string& what, Verdict verdict, const std::string& text) const {
   return {"pose." + name_ + "." + what, verdict, kRankPose, name_ + " " + text};
 }
 
-void PoseWatch::judge(int64_t now_us, bool judged, std::vector<Condition>& out) const {
+void PoseMonitor::check(int64_t now_us, bool judged, std::vector<Condition>& out) const {
   if (!newest_) return;
   const Odometry& o = newest_->odometry;
-  const Verdict grave = judged ? Verdict::kDoNotUse : Verdict::kDegraded;
+  const Verdict severity = judged ? Verdict::kDoNotUse : Verdict::kDegraded;
   const std::string why = newest_->reason.empty() ? "" : ": " + newest_->reason;
   if (!finite(o)) {
-    out.push_back(condition("not_finite", grave, "has values that are no numbers"));
+    out.push_back(condition("not_finite", severity, "has values that are no numbers"));
   } else if (o.validity == Validity::kInvalid) {
     // An estimate that never worked on this vehicle (no wheels, no camera) is nobody's loss.
-    if (judged || was_usable_) out.push_back(condition("invalid", grave, "is invalid" + why));
+    if (judged || was_usable_) out.push_back(condition("invalid", severity, "is invalid" + why));
   } else {
-    judge_numbers(judged, out);
+    check_covariance(judged, out);
     if (o.validity == Validity::kCoasting && judged)
       out.push_back(condition("coasting", Verdict::kDegraded, "is coasting" + why));
   }
   if (jumps_.within(now_us) > 0)
-    out.push_back(condition("jump", grave, fmt::format("jumped by {:.1f} m without saying so", jump_m_)));
+    out.push_back(condition("jump", severity, fmt::format("jumped by {:.1f} m without saying so", jump_m_)));
   if (judged && resets_.within(now_us) > 0)
     out.push_back(condition("reset", Verdict::kDegraded, fmt::format("moved itself by {:.1f} m at once", reset_m_)));
 }
 
-void PoseWatch::judge_numbers(bool judged, std::vector<Condition>& out) const {
+void PoseMonitor::check_covariance(bool judged, std::vector<Condition>& out) const {
   const Odometry& o = newest_->odometry;
-  if (impossible(o)) {
-    const Verdict grave = judged ? Verdict::kDoNotUse : Verdict::kDegraded;
-    out.push_back(condition("covariance", grave, "has a covariance that is none: a negative variance"));
+  if (has_negative_variance(o)) {
+    const Verdict severity = judged ? Verdict::kDoNotUse : Verdict::kDegraded;
+    out.push_back(condition("covariance", severity, "has a covariance that is none: a negative variance"));
     return;
   }
   if (!judged) return;
@@ -143,7 +143,7 @@ void PoseWatch::judge_numbers(bool judged, std::vector<Condition>& out) const {
   }
 }
 
-PoseReport PoseWatch::report() const {
+PoseReport PoseMonitor::report() const {
   PoseReport report;
   report.name = name_;
   if (!newest_) return report;

@@ -41,19 +41,19 @@ struct PoseReport {
   double speed = 0.0;         ///< m/s, forward
 };
 
-class PoseWatch {
+class PoseMonitor {
  public:
-  PoseWatch(const std::string& name, const PoseLimits& limits) : name_(name), limits_(limits) {}
+  PoseMonitor(const std::string& name, const PoseLimits& limits) : name_(name), limits_(limits) {}
 
   /// `facts` in the frame that all absolute poses share (health/health.h sees to that).
-  void seen(int64_t now_us, const PoseFacts& facts);
-  /// Whether `facts` is of another run or behind a reset: what was before says nothing of it.
-  [[nodiscard]] bool begins_anew(const PoseFacts& facts) const {
+  void add(int64_t now_us, const PoseFacts& facts);
+  /// Whether `facts` is of another run or behind a reset: what was before is no reference for it.
+  [[nodiscard]] bool is_restart(const PoseFacts& facts) const {
     return newest_ && (newest_->run != facts.run || newest_->reset_counter != facts.reset_counter);
   }
 
   /// `judged`: this is the estimate that the verdict is about.
-  void judge(int64_t now_us, bool judged, std::vector<Condition>& out) const;
+  void check(int64_t now_us, bool judged, std::vector<Condition>& out) const;
 
   [[nodiscard]] PoseReport report() const;
 
@@ -72,9 +72,9 @@ class PoseWatch {
   [[nodiscard]] std::optional<Point> at(int64_t t_us) const;
 
  private:
-  void watch_jumps(int64_t now_us, const PoseFacts& facts);
-  void keep(const PoseFacts& facts);
-  void judge_numbers(bool judged, std::vector<Condition>& out) const;
+  void detect_jump(int64_t now_us, const PoseFacts& facts);
+  void store(const PoseFacts& facts);
+  void check_covariance(bool judged, std::vector<Condition>& out) const;
   [[nodiscard]] Condition condition(const std::string& what, Verdict verdict, const std::string& text) const;
 
   std::string name_;

@@ -30,27 +30,27 @@ struct HeartbeatFacts {
 struct ProcessReport {
   std::string name;
   std::optional<HeartbeatFacts> newest;
-  double age_s = -1.0;  ///< since the newest heartbeat; -1: never heard
+  double age_s = -1.0;  ///< since the newest heartbeat; -1: none yet
   int restarts = 0;
   bool silent = false;
 };
 
-class ProcessWatch {
+class ProcessMonitor {
  public:
   /// `expected`: the vehicle has it; another one is missed only once it has shown that it lives.
   /// `several`: it may run more than once side by side.
-  ProcessWatch(const std::string& name, const ProcessLimits& limits, bool expected = false, bool several = false)
+  ProcessMonitor(const std::string& name, const ProcessLimits& limits, bool expected = false, bool several = false)
       : name_(name), limits_(limits), expected_(expected), several_(several) {}
 
   void heartbeat(int64_t now_us, const HeartbeatFacts& facts);
-  void judge(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const;
+  void check(int64_t now_us, int64_t start_us, std::vector<Condition>& out) const;
   [[nodiscard]] ProcessReport report(int64_t now_us) const;
 
  private:
   [[nodiscard]] bool silent(int64_t now_us) const;
   [[nodiscard]] double silent_after() const;
   [[nodiscard]] Condition condition(const std::string& what, const std::string& text) const;
-  void judge_load(int64_t now_us, std::vector<Condition>& out) const;
+  void check_load(int64_t now_us, std::vector<Condition>& out) const;
   void change_run(int64_t now_us, int64_t run);
 
   std::string name_;
@@ -62,7 +62,7 @@ class ProcessWatch {
   int64_t previous_run_ = 0;
   std::deque<int64_t> intervals_us_;  ///< between the last few heartbeats
   int restarts_ = 0;
-  Recent drops_, restarted_, back_and_forth_;
+  Recent drops_, restarted_, run_alternations_;
 };
 
 }  // namespace roadfix
