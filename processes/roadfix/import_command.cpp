@@ -68,6 +68,9 @@ void run(Options& options) {
   if (!options.read.topics.empty() && options.read.format != "rosbag") {
     throw std::runtime_error("--topic is for ROS bags; this source is of format " + options.read.format);
   }
+  if (options.read.gnss_from_oxts && options.read.format != "kitti_raw") {
+    throw std::runtime_error("--gnss-from-oxts is for KITTI raw; this source is of format " + options.read.format);
+  }
   Drive drive = read_source(options.source, options.read);
   for (const std::string& remark : drive.remarks) std::cout << "  " << remark << "\n";
   const std::string name = drive.description.name;
@@ -131,7 +134,7 @@ void add_import_command(CLI::App& app) {
                       "folder for calibration.yaml and one file of defaults per process");
   command
       ->add_option("--format", options->read.format,
-                   "folder, kitti, euroc, rosbag or poses (default: what it looks like)")
+                   "folder, kitti, kitti_raw, euroc, comma2k19, rosbag or poses (default: what it looks like)")
       ->check(CLI::IsMember(source_formats()));
   command->add_option("--without", options->changes.without, "sensors to leave out, with commas between")
       ->delimiter(',')
@@ -144,6 +147,8 @@ void add_import_command(CLI::App& app) {
   command->add_option("--times", options->times, "poses: file of frame times");
   command->add_option("--reference", options->reference, "poses: file of true poses");
   command->add_option("--topic", options->topics, "ROS bags: ROLE=/TOPIC, for example imu=/x/imu; may be given again");
+  command->add_flag("--gnss-from-oxts", options->read.gnss_from_oxts,
+                    "KITTI raw: take the places of the GNSS/INS unit, which are also the reference, for fixes");
   add_progress(*command, options->progress);
   add_gnss_flags(*command, *options);
   command->callback([command, options] {

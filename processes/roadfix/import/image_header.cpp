@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
+
+#include "config/config_error.h"
 
 namespace roadfix {
 namespace {
@@ -71,6 +74,13 @@ bool has_jpeg_end(std::span<const uint8_t> bytes) {
 }
 
 }  // namespace
+
+ImageHeader read_picture_header(const std::filesystem::path& path) {
+  const std::string bytes = read_text_file(path, std::size_t{1} << 27U);
+  const auto header = read_image_header(std::span(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
+  if (!header) throw ConfigError(path.string(), 0, "is no picture");
+  return *header;
+}
 
 bool has_image_end(std::span<const uint8_t> bytes, ImageHeader::Kind kind) {
   return kind == ImageHeader::Kind::kPng ? has_png_end(bytes) : has_jpeg_end(bytes);

@@ -10,6 +10,7 @@
 #include "config/scalar.h"
 #include "roadfix/import/image_header.h"
 #include "roadfix/import/pose_files.h"
+#include "roadfix/import/sample_rate.h"
 
 namespace roadfix {
 namespace {
@@ -73,19 +74,14 @@ std::vector<FrameFile> find_frames(const fs::path& folder, const std::vector<int
 
 CameraCalibration camera(const Projection& projection, const std::vector<FrameFile>& frames, double y, bool colour) {
   CameraCalibration calibration;
-  const std::string bytes = read_text_file(frames.front().path);
-  const auto header = read_image_header(std::span(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()));
-  if (!header) throw ConfigError(frames.front().path.string(), 0, "is no picture");
-  calibration.width_px = header->width_px;
-  calibration.height_px = header->height_px;
+  const ImageHeader header = read_picture_header(frames.front().path);
+  calibration.width_px = header.width_px;
+  calibration.height_px = header.height_px;
   calibration.model = CameraModel::kPinhole;
   calibration.intrinsics_px = projection.intrinsics_px;
   calibration.distortion = CameraDistortion{};
   calibration.colour = colour ? CameraColour::kBgr : CameraColour::kGray;
-  if (frames.size() > 1) {
-    const double seconds = seconds_between(frames.front().t_us, frames.back().t_us);
-    if (seconds > 0.0) calibration.rate = std::round(static_cast<double>(frames.size() - 1) / seconds * 1e3) / 1e3;
-  }
+  calibration.rate = rate_of(frames);
   const Eigen::Quaterniond q = q_body_camera();
   calibration.mounting = CameraMounting{{0.0, y, 0.0}, {q.w(), q.x(), q.y(), q.z()}, std::nullopt, std::nullopt};
   return calibration;

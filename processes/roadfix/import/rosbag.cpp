@@ -10,6 +10,7 @@
 #include "geometry/so3.h"
 #include "roadfix/import/ros_choice.h"
 #include "roadfix/import/ros_frames.h"
+#include "roadfix/import/sample_rate.h"
 
 namespace roadfix {
 namespace {
@@ -59,16 +60,6 @@ template <class T>
 std::vector<T> in_order(std::vector<T> list) {
   std::stable_sort(list.begin(), list.end(), [](const T& a, const T& b) { return a.t_us < b.t_us; });
   return list;
-}
-
-template <class T>
-std::optional<double> rate_of(const std::vector<T>& list) {
-  if (list.size() < 2) return std::nullopt;
-  const double seconds = seconds_between(list.front().t_us, list.back().t_us);
-  if (!(seconds > 0.0)) return std::nullopt;
-  const double rate = static_cast<double>(list.size() - 1) / seconds;
-  if (rate > 9999.0 || rate < 0.011) return std::nullopt;
-  return std::round(rate * 1e3) / 1e3;
 }
 
 class BagImporter {

@@ -8,6 +8,7 @@
 #include "roadfix/import/drive_folder.h"
 #include "roadfix/import/euroc.h"
 #include "roadfix/import/kitti.h"
+#include "roadfix/import/kitti_raw.h"
 #include "roadfix/import/pose_files.h"
 #include "roadfix/import/rosbag.h"
 #include "roadfix/rosbag/bag.h"
@@ -17,7 +18,8 @@ namespace roadfix {
 namespace fs = std::filesystem;
 
 const std::vector<std::string>& source_formats() {
-  static const std::vector<std::string> formats = {"folder", "kitti", "euroc", "rosbag", "poses"};
+  static const std::vector<std::string> formats = {"folder",    "kitti",  "kitti_raw", "euroc",
+                                                   "comma2k19", "rosbag", "poses"};
   return formats;
 }
 
@@ -38,6 +40,7 @@ const std::vector<Layout>& layouts() {
       {"euroc", "EuRoC", {{"mav0"}}, {}},
       {"euroc", "the inside of EuRoC's mav0", {{"imu0"}, {"cam0"}}, {"imu0", "cam0"}},
       {"kitti", "KITTI odometry", {{"calib.txt"}, {"image_0", "image_2"}}, {"calib.txt", "image_0", "image_2"}},
+      {"kitti_raw", "KITTI raw", {{"oxts"}}, {"image_00", "image_02"}},
       {"poses", "files of poses", {{"*_times.txt"}}, {"*_gt.txt"}},
   };
   return all;
@@ -86,6 +89,7 @@ std::string detect_format(const fs::path& source) {
 Drive read_source(const fs::path& source, const SourceOptions& options) {
   if (options.format == "folder") return read_drive_folder(source);
   if (options.format == "kitti") return read_kitti(source);
+  if (options.format == "kitti_raw") return read_kitti_raw(source, options.gnss_from_oxts);
   if (options.format == "euroc") return read_euroc(source);
   if (options.format == "rosbag") return read_rosbag(source, options.topics);
   return read_poses(source, {options.sequence, options.times, options.reference});

@@ -11,7 +11,7 @@
 
 namespace roadfix {
 
-/// folder, kitti, euroc, rosbag, poses.
+/// folder, kitti, kitti_raw, euroc, comma2k19, rosbag, poses.
 const std::vector<std::string>& source_formats();
 
 /// The format that the source looks like; ConfigError with what each would need where it looks like none.
@@ -25,6 +25,8 @@ struct SourceOptions {
   std::optional<std::filesystem::path> reference;
   /// rosbag: roles (ros_choice.h) to topics, where types and names leave a choice.
   std::map<std::string, std::string> topics = {};
+  /// kitti_raw: the unit's fused places become fixes.
+  bool gnss_from_oxts = false;
 };
 
 Drive read_source(const std::filesystem::path& source, const SourceOptions& options);
