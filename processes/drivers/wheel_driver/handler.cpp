@@ -13,12 +13,25 @@ namespace {
 bool contains(const std::vector<int64_t>& values, int64_t value) {
   return std::find(values.begin(), values.end(), value) != values.end();
 }
+
+/// 0: the counter is of 64 bits.
+uint64_t range_of(const CanSignal& counter) { return counter.length < 64 ? uint64_t{1} << counter.length : 0; }
 }  // namespace
+
+bool same_length(const std::vector<CanSignal>& counters) {
+  return std::all_of(counters.begin(), counters.end(), [&](const CanSignal& signal) {
+    return signal.length == counters.front().length && signal.factor == 1.0 && signal.offset == 0.0;
+  });
+}
 
 WheelDriver::WheelDriver(const WheelDriverConfig& config) : config_(config), framer_({probe_can_line}) {
   for (const CanSignal& speed : config.speeds) speeds_.push_back(tracked(speed));
   if (config.direction) direction_ = tracked(*config.direction);
   if (config.yaw_rate) yaw_rate_ = tracked(*config.yaw_rate);
+  if (config.ticks) {
+    encoder_.emplace(
+        EncoderConfig{config.ticks->ticks_per_turn, config.ticks->wheel_radius, range_of(config.speeds.front())});
+  }
 }
 
 WheelDriver::Tracked WheelDriver::tracked(const CanSignal& signal) {
@@ -35,6 +48,7 @@ void WheelDriver::opened(int) {
   framer_.reset();
   clock_.restart();
   for (Tracked& speed : speeds_) speed.fresh = false;
+  if (encoder_) encoder_->restart();
 }
 
 void WheelDriver::take(int, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) {
@@ -77,19 +91,34 @@ bool WheelDriver::young(const Tracked& signal, int64_t utime) const {
   return static_cast<double>(utime - signal.utime) <= config_.max_age * 1e6;
 }
 
+bool WheelDriver::take_speeds(WheelSample& sample) {
+  const bool available =
+      std::all_of(speeds_.begin(), speeds_.end(), [](const Tracked& t) { return t.value.has_value(); });
+  for (Tracked& speed : speeds_) speed.fresh = false;
+  if (!available || (encoder_ && !count_speeds(sample))) return false;
+  for (std::size_t i = 0; i < speeds_.size(); ++i) {
+    if (!encoder_) sample.speeds[i] = *speeds_[i].value;
+    if (!(std::abs(sample.speeds[i]) <= config_.max_speed)) return false;
+    if (!config_.speeds_signed) sample.speeds[i] = std::abs(sample.speeds[i]);  // a magnitude, whatever the sign
+  }
+  return true;
+}
+
+bool WheelDriver::count_speeds(WheelSample& sample) {
+  EncoderReading reading{sample.t_us, sample.num_speeds, {}};
+  for (std::size_t i = 0; i < speeds_.size(); ++i) reading.ticks[i] = speeds_[i].raw.value_or(0);
+  const std::optional<EncoderSpeeds> counted = encoder_->add(reading);
+  if (!counted) return false;
+  sample.t_us = counted->t_us;
+  sample.speeds = counted->speed;
+  return true;
+}
+
 void WheelDriver::publish(int64_t utime, SensorOutputs& outputs) {
   WheelSample sample;
   sample.t_us = utime;
   sample.num_speeds = static_cast<int>(speeds_.size());
-  bool available = true;
-  for (std::size_t i = 0; i < speeds_.size(); ++i) {
-    speeds_[i].fresh = false;
-    const std::optional<double>& value = speeds_[i].value;
-    available = available && value && std::abs(*value) <= config_.max_speed;
-    if (available)
-      sample.speeds[i] = config_.speeds_signed ? *value : std::abs(*value);  // a magnitude, whatever the sign
-  }
-  if (!available) {
+  if (!take_speeds(sample)) {
     ++unavailable_;
     return;
   }
@@ -105,7 +134,7 @@ void WheelDriver::publish(int64_t utime, SensorOutputs& outputs) {
   wheels_t message = to_message(sample);
   if (outputs.publish(config_.channel, message)) {
     ++published_;
-    newest_utime_ = utime;
+    newest_utime_ = sample.t_us;
   } else {
     ++late_;
   }

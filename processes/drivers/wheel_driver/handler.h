@@ -9,8 +9,24 @@
 #include "drivers/protocols/candump.h"
 #include "drivers/protocols/device_clock.h"
 #include "drivers/protocols/framer.h"
+#include "samples/samples.h"
+#include "wheel/wheel_encoder.h"
 
 namespace roadfix {
+
+/// Where the signals are counters of encoders in place of speeds. A counter's range is that of its signal's bits.
+struct WheelTicks {
+  double ticks_per_turn = 0.0;
+  double wheel_radius = 0.0;  ///< m, rolling
+};
+
+template <class Visitor>
+void visit(WheelTicks& c, Visitor& v) {
+  v.require("ticks_per_turn");
+  v.number("ticks_per_turn", c.ticks_per_turn, 1e-3, 1e7);
+  v.require("wheel_radius_m");
+  v.number("wheel_radius_m", c.wheel_radius, 0.01, 5.0);
+}
 
 struct WheelDriverConfig {
   DeviceConfig device;
@@ -18,6 +34,7 @@ struct WheelDriverConfig {
   /// One: of the rear axle's centre. Four: front left, front right, rear left, rear right. m/s.
   std::vector<CanSignal> speeds;
   bool speeds_signed = false;          ///< negative when reversing
+  std::optional<WheelTicks> ticks;     ///< `speeds` are counters
   std::optional<CanSignal> direction;  ///< for example the gear lever
   std::vector<int64_t> forward;        ///< raw values of `direction`
   std::vector<int64_t> reverse;
@@ -27,6 +44,9 @@ struct WheelDriverConfig {
   double max_yaw_rate = 10.0;         ///< rad/s; a faster turn is an error, and no yaw rate
 };
 
+/// What counters must be: of one range, and untouched by a factor.
+bool same_length(const std::vector<CanSignal>& counters);
+
 template <class Visitor>
 void visit(WheelDriverConfig& c, Visitor& v) {
   visit(c.device, v);
@@ -35,6 +55,8 @@ void visit(WheelDriverConfig& c, Visitor& v) {
   v.groups("speeds", c.speeds);
   v.check("speeds", c.speeds.size() == 1 || c.speeds.size() == 4, "must be one signal, or four");
   v.boolean("speeds_signed", c.speeds_signed);
+  v.optional_group("ticks", c.ticks);
+  v.check("ticks", !c.ticks || same_length(c.speeds), "counters must all be of one length, without factor and offset");
   v.optional_group("direction", c.direction);
   v.integers("forward", c.forward, INT64_MIN, INT64_MAX);
   v.integers("reverse", c.reverse, INT64_MIN, INT64_MAX);
@@ -68,6 +90,9 @@ class WheelDriver : public SensorDriver {
   static bool update(Tracked& signal, const CanFrame& frame, int64_t utime);
   void take_frame(const CanFrame& frame, int64_t read_utime, SensorOutputs& outputs);
   void publish(int64_t utime, SensorOutputs& outputs);
+  /// The wheels' newest values as speeds of `sample`; false where one is not available, or the first of its counter.
+  bool take_speeds(WheelSample& sample);
+  bool count_speeds(WheelSample& sample);
   [[nodiscard]] bool young(const Tracked& signal, int64_t utime) const;
 
   WheelDriverConfig config_;
@@ -75,6 +100,7 @@ class WheelDriver : public SensorDriver {
   DeviceClock clock_;
   std::vector<Tracked> speeds_;
   std::optional<Tracked> direction_, yaw_rate_;
+  std::optional<WheelEncoder> encoder_;
   int64_t frames_ = 0, used_ = 0, malformed_ = 0, unavailable_ = 0;
   int64_t published_ = 0, late_ = 0, newest_utime_ = 0;
 };

@@ -94,6 +94,57 @@ TEST_CASE("cut at every byte the messages are the same, and garbage is counted")
   }
 }
 
+const char* const kCounter = R"(
+device: "candump:drive.log"
+speeds: [{frame: "0x1A0", start_bit: 0, length: 16, invalid: [65535]}]   # of the rear axle
+speeds_signed: true
+ticks: {ticks_per_turn: 100, wheel_radius_m: 0.3}
+)";
+
+/// A frame with a little-endian counter every 20 ms.
+std::vector<wheels_t> run_counter(const std::vector<int>& readings, const std::string& config = kCounter) {
+  std::vector<RawRead> reads;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const int64_t t_us = kStart + int64_t{20'000} * static_cast<int64_t>(i);
+    char frame[16];
+    std::snprintf(frame, sizeof frame, "1A0#%02X%02X", readings[i] & 0xFF, (readings[i] >> 8) & 0xFF);
+    reads.push_back({t_us, test::bytes_of(line(t_us, frame))});
+  }
+  WheelDriver driver(parse_config<WheelDriverConfig>(config, "wheel_driver.yaml"));
+  return test::run_driver_over(driver, reads).on<wheels_t>("WHEELS");
+}
+
+TEST_CASE("counters become speeds at the middle of their intervals, over the end of their range, in both directions") {
+  constexpr double kTick_mps = 2.0 * 3.14159265358979 * 0.3 / 100.0 / 0.02;  // one tick in 20 ms
+  const auto wheels = run_counter({65510, 65520, 65530, 4, 14, 9, 65532});
+  REQUIRE(wheels.size() == 6);
+  CHECK(wheels[2].num_speeds == 1);
+  CHECK(wheels[2].direction == wheels_t::DIRECTION_SIGNED);
+  CHECK(wheels[2].speed_mps[0] == Approx(10.0 * kTick_mps).epsilon(1e-3));  // 65530 to 4
+  CHECK(std::abs(wheels[2].utime - (kStart + 50'000)) < 200);
+  CHECK(wheels[4].speed_mps[0] == Approx(-5.0 * kTick_mps).epsilon(1e-3));
+  CHECK(wheels[5].speed_mps[0] == Approx(-13.0 * kTick_mps).epsilon(1e-3));  // 9 to 65532
+}
+
+TEST_CASE("a counter that is not available or jumps gives no speed, and goes on behind it") {
+  CHECK(run_counter({100, 110, 65535, 130, 140}).size() == 3);  // the gap's mean, 110 to 130, is one of them
+  CHECK(run_counter({100, 110, 30000, 30010}).size() == 2);     // 28 km/s
+  CHECK(run_counter({100}).empty());
+}
+
+TEST_CASE("counters with a factor, or of several lengths, are refused") {
+  const auto refused = [](const std::string& text, const std::string& what) {
+    CHECK_THROWS_WITH(parse_config<WheelDriverConfig>(text, "f"), Catch::Contains(what));
+  };
+  const std::string ticks = ", ticks: {ticks_per_turn: 100, wheel_radius_m: 0.3}}";
+  refused("{device: 'pty:', speeds: [{frame: '1', length: 16, factor: 0.1}]" + ticks, "without factor");
+  refused("{device: 'pty:', speeds: [{frame: '1', length: 16}, {frame: '1', length: 8}, {frame: '1'}, {frame: '1'}]" +
+              ticks,
+          "of one length");
+  refused("{device: 'pty:', speeds: [{frame: '1'}], ticks: {wheel_radius_m: 0.3}}", "ticks_per_turn");
+  refused("{device: 'pty:', speeds: [{frame: '1'}], ticks: {ticks_per_turn: 5, wheel_radius_m: 31}}", "wheel_radius_m");
+}
+
 TEST_CASE("a mapping that cannot be is refused with its key") {
   const auto refused = [](const std::string& text, const std::string& what) {
     CHECK_THROWS_WITH(parse_config<WheelDriverConfig>(text, "f"), Catch::Contains(what));
