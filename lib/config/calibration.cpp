@@ -57,6 +57,9 @@ void visit(WheelsCalibration& c, Visitor& v) {
   v.optional_number("track_width_m", c.track_width, 0.1, 10.0);
   v.optional_vector("lever_arm_body_m", c.lever_arm, -kMaxLength, kMaxLength);
   v.optional_number("lever_arm_std_m", c.lever_arm_std, 0.0, kMaxLength);
+  v.optional_number("ticks_per_turn", c.ticks_per_turn, 1e-3, 1e7);
+  v.optional_number("wheel_radius_m", c.wheel_radius, 0.01, 5.0);
+  v.optional_integer("ticks_wrap_at", c.ticks_wrap_at, 2, int64_t{1} << 53U);
 }
 
 template <class Visitor>

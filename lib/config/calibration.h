@@ -50,6 +50,10 @@ struct WheelsCalibration {
   std::optional<double> track_width;         ///< m
   std::optional<Eigen::Vector3d> lever_arm;  ///< m, p_body_axle: the rear axle's centre, on the ground
   std::optional<double> lever_arm_std;       ///< m, of each of its parts
+  std::optional<double> ticks_per_turn;      ///< of the encoders, where they are counters
+  std::optional<double> wheel_radius;        ///< m, rolling; turns ticks to metres
+  std::optional<int64_t>
+      ticks_wrap_at;  ///< the counter's range: from the one before it goes to 0; absent: it never does
 };
 
 struct MagCalibration {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -12,6 +13,7 @@
 #include "geometry/so3.h"
 #include "roadfix/import/csv_reader.h"
 #include "roadfix/import/fix_type.h"
+#include "roadfix/import/wheel_csv.h"
 
 namespace roadfix {
 namespace {
@@ -26,8 +28,8 @@ constexpr double kMaxSigma = 1e5;       // m or m/s: a receiver that knows nothi
 constexpr double kMinHeight = -1000.0;  // m, ellipsoid
 constexpr double kMaxHeight = 20000.0;  // m
 constexpr double kMaxField = 10000.0;   // uT
-constexpr double kMaxYawRate = 20.0;    // rad/s
 constexpr double kTeslaPerMicrotesla = 1e-6;
+constexpr double kStandardGravity = 9.80665;  // m/s2, what a sensor's g is (CGPM 1901)
 
 /// The file or its .gz; nothing where neither is there.
 std::optional<fs::path> find_csv(const fs::path& folder, const std::string& name) {
@@ -47,21 +49,44 @@ Eigen::Vector3d vector3(const CsvReader& csv, int first, int second, int third, 
 
 double normalized_longitude(double longitude) { return longitude >= kPi ? longitude - 2.0 * kPi : longitude; }
 
+/// Three columns of one quantity, in SI or in the unit that the other names say.
+class AxisColumns {
+ public:
+  AxisColumns(const CsvReader& csv, const std::string& quantity, const std::string& si, const std::string& other,
+              double unit)
+      : unit_(csv.has(quantity + "_x_" + other) ? unit : 1.0) {
+    const bool in_si = csv.has(quantity + "_x_" + si);
+    if (in_si == csv.has(quantity + "_x_" + other)) {
+      csv.fail(fmt::format("must have either {0}_x_{1}, {0}_y_{1}, {0}_z_{1} or {0}_x_{2}, {0}_y_{2}, {0}_z_{2}",
+                           quantity, si, other));
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      columns_[i] = csv.index(fmt::format("{}_{}_{}", quantity, "xyz"[i], in_si ? si : other));
+    }
+  }
+
+  [[nodiscard]] Eigen::Vector3d read(const CsvReader& csv, double bound) const {
+    return unit_ * vector3(csv, columns_[0], columns_[1], columns_[2], bound / unit_);
+  }
+
+ private:
+  double unit_;
+  std::array<int, 3> columns_{};
+};
+
+std::vector<std::string> axes(const std::string& quantity, const std::string& unit) {
+  return {quantity + "_x_" + unit, quantity + "_y_" + unit, quantity + "_z_" + unit};
+}
+
 std::vector<ImuSample> read_imu(const fs::path& path) {
-  CsvReader csv(path, {{"utime_us", "gyro_x_radps", "gyro_y_radps", "gyro_z_radps", "accel_x_mps2", "accel_y_mps2",
-                        "accel_z_mps2"}});
+  CsvReader csv(
+      path, {{"utime_us"}, {axes("gyro", "radps"), axes("gyro", "degps"), axes("accel", "mps2"), axes("accel", "g")}});
+  const AxisColumns gyro(csv, "gyro", "radps", "degps", kDegree);
+  const AxisColumns accel(csv, "accel", "mps2", "g", kStandardGravity);
   const int t = csv.index("utime_us");
-  const int gx = csv.index("gyro_x_radps");
-  const int gy = csv.index("gyro_y_radps");
-  const int gz = csv.index("gyro_z_radps");
-  const int ax = csv.index("accel_x_mps2");
-  const int ay = csv.index("accel_y_mps2");
-  const int az = csv.index("accel_z_mps2");
   std::vector<ImuSample> samples;
   samples.reserve(csv.expected_rows());
-  while (csv.next()) {
-    samples.push_back({csv.utime(t), vector3(csv, gx, gy, gz, kMaxRate), vector3(csv, ax, ay, az, kMaxAccel)});
-  }
+  while (csv.next()) samples.push_back({csv.utime(t), gyro.read(csv, kMaxRate), accel.read(csv, kMaxAccel)});
   return samples;
 }
 
@@ -122,33 +147,6 @@ std::vector<GnssFix> read_gnss(const fs::path& path, HeightKind height_kind) {
     fixes.push_back(fix);
   }
   return fixes;
-}
-
-std::vector<WheelSample> read_wheels(const fs::path& path) {
-  const std::vector<std::string> four = {"front_left_mps", "front_right_mps", "rear_left_mps", "rear_right_mps"};
-  CsvReader csv(path, {{"utime_us"}, {{"speed_mps"}, four, {"yaw_rate_radps"}}});
-  const bool one = csv.has("speed_mps");
-  if (one == csv.has(four[0])) {
-    csv.fail(fmt::format("must have either column speed_mps or the four {}", fmt::join(four, ", ")));
-  }
-  const int t = csv.index("utime_us");
-  std::vector<WheelSample> samples;
-  bool any_negative = false;
-  while (csv.next()) {
-    WheelSample sample;
-    sample.t_us = csv.utime(t);
-    sample.num_speeds = one ? 1 : 4;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(sample.num_speeds); ++i) {
-      sample.speeds[i] = csv.number(csv.index(one ? "speed_mps" : four[i]), -kMaxSpeed, kMaxSpeed);
-      any_negative = any_negative || sample.speeds[i] < 0.0;
-    }
-    if (csv.has("yaw_rate_radps")) sample.yaw_rate = csv.number(csv.index("yaw_rate_radps"), -kMaxYawRate, kMaxYawRate);
-    samples.push_back(sample);
-  }
-  for (WheelSample& sample : samples) {
-    sample.direction = any_negative ? WheelDirection::kSigned : WheelDirection::kUnknown;
-  }
-  return samples;
 }
 
 std::vector<MagSample> read_mag(const fs::path& path) {
@@ -234,7 +232,8 @@ DriveFolder read_drive_folder(const fs::path& folder) {
   };
   if (const auto path = find("imu")) drive.imu = read_imu(*path);
   if (const auto path = find("gnss")) drive.gnss = read_gnss(*path, height);
-  if (const auto path = find("wheels")) drive.wheels = read_wheels(*path);
+  if (const auto path = find("wheels"))
+    drive.wheels = read_wheel_csv(*path, drive.description.calibration.sensors.wheels, drive.remarks);
   if (const auto path = find("mag")) drive.mag = read_mag(*path);
   if (const auto path = find("frames_left")) drive.frames_left = read_frames(*path, folder);
   if (const auto path = find("frames_right")) drive.frames_right = read_frames(*path, folder);
