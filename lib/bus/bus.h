@@ -1,5 +1,5 @@
-/// How processes talk. One interface, several ways: the network (LCM over UDP), memory (tests), a log (a recorded drive
-/// in the order of its arrival). A handler cannot tell which.
+/// How processes exchange messages. One interface, several implementations: the network (LCM over
+/// UDP), memory (tests), a log (a recorded drive in the order of its arrival). A handler cannot distinguish them.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@
 
 namespace roadfix {
 
-/// A bus that cannot be opened or used; the text says what to do.
+/// A bus that cannot be opened or used; the text names the remedy.
 struct BusError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -49,9 +49,9 @@ class Bus {
   /// Throws BusError where the message could never be sent.
   virtual void publish(const std::string& channel, std::span<const uint8_t> bytes) = 0;
 
-  /// Waits up to `patience` for a message, then hands out all that are there, in the order of their arrival.
+  /// Waits up to `timeout` for a message, then hands out all that are there, in the order of their arrival.
   /// False when no message will ever come again. What a handler throws comes through.
-  virtual bool handle(std::chrono::milliseconds patience) = 0;
+  virtual bool handle(std::chrono::milliseconds timeout) = 0;
 
   /// Per subscription, in the order of subscribe().
   [[nodiscard]] virtual std::vector<QueueStatus> queues() const { return {}; }

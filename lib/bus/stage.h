@@ -1,5 +1,5 @@
 /// What a process is to the bus: a handler of checked, ordered messages. The same stage runs live, in replay and under
-/// verify, and cannot tell which (docs/DESIGN.md, section 4).
+/// verify, and cannot distinguish them (docs/DESIGN.md, section 4).
 ///
 /// For each accepted clock sample of time T the runner calls, in this order:
 ///   on_clock(sample)     at arrival, ahead of the horizon;
@@ -26,7 +26,7 @@ struct OutputSpec {
   std::string type;
 };
 
-/// A stage that asks for a snapshot gets it, whatever this says.
+/// A stage that asks for a snapshot gets it in either case.
 enum class Snapshots {
   kPeriodic,  ///< every 9 s of data as well
   kOnRequest  ///< no others

@@ -54,7 +54,7 @@ void HealthPublisher::publish_heartbeat(int64_t now_us) {
   heartbeat.run = run_;
   heartbeat.seq = heartbeat_seq_++;
   unsent_.note(now_us, bus_.unsent());
-  heartbeat.state_reason = unsent_.trouble(now_us);
+  heartbeat.state_reason = unsent_.state_reason(now_us);
   heartbeat.state = heartbeat.state_reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;
   heartbeat.cpu_share = load_.cpu_share();
   heartbeat.rss_bytes = resident_bytes();

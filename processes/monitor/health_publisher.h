@@ -5,7 +5,7 @@
 
 #include "bus/bus.h"
 #include "bus/run/process_facts.h"
-#include "bus/run/unsent_watch.h"
+#include "bus/run/unsent_monitor.h"
 #include "monitor/handler.h"
 
 namespace roadfix {
@@ -30,7 +30,7 @@ class HealthPublisher : public MonitorListener {
   int64_t period_us_;
   bool heartbeat_;
   ProcessLoad load_;
-  UnsentWatch unsent_;
+  UnsentMonitor unsent_;
   int64_t run_ = 0;
   int64_t seq_ = 0, heartbeat_seq_ = 0;
   int64_t published_us_ = 0, heartbeat_us_ = 0;

@@ -54,7 +54,7 @@ std::unique_ptr<Dashboard> dashboard_of(const MonitorOptions& options, const Mon
 }
 
 void run_live(const MonitorOptions& options, const MonitorConfig& config) {
-  give_memory_back();
+  release_free_memory();
   if (options.realtime > 0) make_realtime(options.realtime);
   NetworkBus bus(options.bus);
   RunClock clock;

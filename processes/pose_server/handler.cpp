@@ -100,9 +100,9 @@ void PoseServerHandler::take_pose(std::span<const uint8_t> bytes) {
   pose_us_ = m.utime;
   arrived_us_ = now_us_;
   const NmeaPose pose = nmea_pose(m, fix_at(m.utime), config_.point, geoid_);
-  trouble_ = pose.quality != NmeaQuality::kNone
-                 ? ""
-                 : config_.pose_channel + " gives no position: " + (m.reason.empty() ? "not in ENU" : m.reason);
+  state_reason_ = pose.quality != NmeaQuality::kNone
+                      ? ""
+                      : config_.pose_channel + " gives no position: " + (m.reason.empty() ? "not in ENU" : m.reason);
   out_ += due(pose);
 }
 
@@ -111,7 +111,7 @@ std::string PoseServerHandler::advance(int64_t now_us) {
   if (!arrived_us_) arrived_us_ = now_us;
   const int64_t silent_us = now_us - *arrived_us_;
   if (silent_us < microseconds(config_.silence)) return {};
-  trouble_ =
+  state_reason_ =
       config_.pose_channel +
       (pose_us_ ? fmt::format(" is silent for {:.1f} s", static_cast<double>(silent_us) * 1e-6) : " was never heard");
   NmeaPose nothing;

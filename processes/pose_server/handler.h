@@ -28,7 +28,7 @@ class PoseServerHandler {
   [[nodiscard]] int64_t poses() const { return poses_; }
   [[nodiscard]] int64_t refused() const { return refused_; }  ///< undecodable, or not newer than the one before
   /// In plain words; empty where positions go out.
-  [[nodiscard]] const std::string& trouble() const { return trouble_; }
+  [[nodiscard]] const std::string& state_reason() const { return state_reason_; }
 
  private:
   static constexpr std::size_t kSentences = 6;
@@ -55,7 +55,7 @@ class PoseServerHandler {
   std::optional<int64_t> pose_us_;     ///< utime of the newest pose
   std::optional<int64_t> arrived_us_;  ///< when it came; before the first pose: when time began
   int64_t now_us_ = 0;
-  std::string out_, trouble_ = "no pose yet";
+  std::string out_, state_reason_ = "no pose yet";
   int64_t poses_ = 0, refused_ = 0;
 };
 

@@ -28,7 +28,7 @@ class Outlet {
   /// For the user: where it is found, for example "tcp 127.0.0.1:10110".
   [[nodiscard]] virtual std::string name() const = 0;
   /// In plain words; empty where all is well.
-  [[nodiscard]] virtual std::string trouble() const { return {}; }
+  [[nodiscard]] virtual std::string state_reason() const { return {}; }
 };
 
 /// Listens at once. A client that takes nothing for `patience_s` is let go; those beyond `most` are turned away.

@@ -13,7 +13,7 @@
 #include "bus/run/run_process.h"
 #include "bus/run/service.h"
 #include "bus/run/stage_runner.h"
-#include "bus/run/unsent_watch.h"
+#include "bus/run/unsent_monitor.h"
 #include "bus/transport/network_bus.h"
 #include "config/config.h"
 #include "pose_server/handler.h"
@@ -30,7 +30,7 @@ constexpr int64_t kHeartbeat_us = 1'000'000;
 /// HEARTBEAT_POSE_SERVER.
 class Heartbeat {
  public:
-  void publish(Bus& bus, RunClock& clock, const std::string& trouble) {
+  void publish(Bus& bus, RunClock& clock, const std::string& state_reason) {
     heartbeat_t heartbeat{};
     heartbeat.utime = clock.now_utime();
     heartbeat.run = clock.run();
@@ -39,15 +39,15 @@ class Heartbeat {
     heartbeat.cpu_share = load_.cpu_share();
     heartbeat.rss_bytes = resident_bytes();
     unsent_.note(heartbeat.utime, bus.unsent());
-    const std::string unsent = unsent_.trouble(heartbeat.utime);
-    heartbeat.state_reason = trouble + (trouble.empty() || unsent.empty() ? "" : "; ") + unsent;
+    const std::string unsent = unsent_.state_reason(heartbeat.utime);
+    heartbeat.state_reason = state_reason + (state_reason.empty() || unsent.empty() ? "" : "; ") + unsent;
     heartbeat.state = heartbeat.state_reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;
     bus.publish(stage_channel("HEARTBEAT_", "pose_server"), encode(heartbeat));
   }
 
  private:
   ProcessLoad load_;
-  UnsentWatch unsent_;
+  UnsentMonitor unsent_;
   int64_t seq_ = 0;
 };
 
@@ -73,7 +73,7 @@ std::unique_ptr<GeoidModel> geoid_of(const PoseServerConfig& config) {
 void run_live(const PoseServerOptions& options, const PoseServerConfig& config) {
   const std::unique_ptr<GeoidModel> geoid = geoid_of(config);
   const std::vector<std::unique_ptr<Outlet>> outlets = open_outlets(config);
-  give_memory_back();
+  release_free_memory();
   if (options.realtime > 0) make_realtime(options.realtime);
   NetworkBus bus(options.bus);
   RunClock clock;
@@ -100,11 +100,11 @@ void run_live(const PoseServerOptions& options, const PoseServerConfig& config) 
     for (const auto& outlet : outlets) outlet->step(Outlet::Clock::now());
     if (now_us < next_heartbeat_us) continue;
     next_heartbeat_us = now_us + kHeartbeat_us;
-    std::string trouble = handler.trouble();
+    std::string state_reason = handler.state_reason();
     for (const auto& outlet : outlets) {
-      if (!outlet->trouble().empty()) trouble += (trouble.empty() ? "" : "; ") + outlet->trouble();
+      if (!outlet->state_reason().empty()) state_reason += (state_reason.empty() ? "" : "; ") + outlet->state_reason();
     }
-    heartbeat.publish(bus, clock, trouble);
+    heartbeat.publish(bus, clock, state_reason);
   }
   service.stopping();
 }

@@ -44,7 +44,7 @@ class SerialOutlet final : public Outlet {
   }
 
   [[nodiscard]] std::string name() const override { return "serial " + device_; }
-  [[nodiscard]] std::string trouble() const override { return trouble_; }
+  [[nodiscard]] std::string state_reason() const override { return state_reason_; }
 
  private:
   void flush(Clock::time_point now) {
@@ -56,7 +56,7 @@ class SerialOutlet final : public Outlet {
     if (end_.open()) return;  // ours from both ends: it cannot go away
     port_ = Descriptor();
     queue_.clear();
-    trouble_ = name() + " went away";
+    state_reason_ = name() + " went away";
     due_ = now + kReopen;
   }
 
@@ -69,9 +69,9 @@ class SerialOutlet final : public Outlet {
     due_ = now + kReopen;
     try {
       port_ = Descriptor(open_serial_port(device_, baud_));
-      trouble_.clear();
+      state_reason_.clear();
     } catch (const SourceError& e) {
-      trouble_ = std::string("serial ") + e.what();
+      state_reason_ = std::string("serial ") + e.what();
     }
   }
 
@@ -80,7 +80,7 @@ class SerialOutlet final : public Outlet {
   Descriptor port_, end_;  ///< end_: the other end of a pseudo-terminal of ours
   SentenceQueue queue_{kMostWaiting};
   Clock::time_point due_{};
-  std::string trouble_;
+  std::string state_reason_;
 };
 
 }  // namespace

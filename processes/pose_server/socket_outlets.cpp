@@ -57,7 +57,7 @@ class TcpOutlet final : public Outlet {
   }
 
   [[nodiscard]] std::string name() const override { return "tcp " + address_; }
-  [[nodiscard]] std::string trouble() const override {
+  [[nodiscard]] std::string state_reason() const override {
     return turned_away_ ? fmt::format("{} has no room for more than {} clients", name(), most_) : std::string();
   }
 
@@ -139,7 +139,9 @@ class UdpOutlet final : public Outlet {
   }
   void step(Clock::time_point) override {}
   [[nodiscard]] std::string name() const override { return "udp " + text_; }
-  [[nodiscard]] std::string trouble() const override { return refused_.empty() ? refused_ : name() + ": " + refused_; }
+  [[nodiscard]] std::string state_reason() const override {
+    return refused_.empty() ? refused_ : name() + ": " + refused_;
+  }
 
  private:
   std::string text_;

@@ -36,7 +36,7 @@ int record(const CommandLine& arguments, const std::string& folder) {
   }
   catch_stop_signals();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is then an error like a full disk
-  give_memory_back();
+  release_free_memory();
   if (arguments.realtime > 0) make_realtime(arguments.realtime);
   NetworkBus bus(arguments.bus);
   RunClock clock;

@@ -19,9 +19,9 @@ bool MessageQueue::push(const std::string& channel, int64_t received_us, std::sp
   return true;
 }
 
-std::optional<QueuedMessage> MessageQueue::pop(std::chrono::milliseconds patience) {
+std::optional<QueuedMessage> MessageQueue::pop(std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
-  if (!arrived_.wait_for(lock, patience, [&] { return !messages_.empty(); })) return std::nullopt;
+  if (!arrived_.wait_for(lock, timeout, [&] { return !messages_.empty(); })) return std::nullopt;
   QueuedMessage message = std::move(messages_.front());
   messages_.pop_front();
   bytes_ -= message.data.size();

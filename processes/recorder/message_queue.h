@@ -28,8 +28,8 @@ class MessageQueue {
   /// False where the message did not fit; it is counted.
   bool push(const std::string& channel, int64_t received_us, std::span<const uint8_t> data);
 
-  /// The oldest message, waiting for one up to `patience`.
-  std::optional<QueuedMessage> pop(std::chrono::milliseconds patience);
+  /// The oldest message, waiting for one up to `timeout`.
+  std::optional<QueuedMessage> pop(std::chrono::milliseconds timeout);
 
   [[nodiscard]] std::map<std::string, int64_t> dropped() const;
   [[nodiscard]] std::size_t bytes() const;

@@ -41,7 +41,7 @@ void RecorderHeartbeat::publish(Bus& bus, RunClock& clock, const std::map<std::s
     say(fmt::format("{} messages did not fit into memory, the kernel dropped {} datagrams", lost,
                     heartbeat.kernel_drops));
   }
-  if (const std::string unsent = unsent_.trouble(heartbeat.utime); !unsent.empty()) say(unsent);
+  if (const std::string unsent = unsent_.state_reason(heartbeat.utime); !unsent.empty()) say(unsent);
   heartbeat.state = reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;
   bus.publish(channel_, encode(heartbeat));
 }

@@ -9,7 +9,7 @@
 #include "bus/bus.h"
 #include "bus/run/process_facts.h"
 #include "bus/run/run_clock.h"
-#include "bus/run/unsent_watch.h"
+#include "bus/run/unsent_monitor.h"
 
 namespace roadfix {
 
@@ -25,7 +25,7 @@ class RecorderHeartbeat {
  private:
   std::string channel_;
   ProcessLoad load_;
-  UnsentWatch unsent_;
+  UnsentMonitor unsent_;
   int64_t seq_ = 0;
 };
 

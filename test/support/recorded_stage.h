@@ -20,7 +20,7 @@ class Recorder {
       log_.push_back({std::string(message.channel), header, {message.bytes.begin(), message.bytes.end()}});
     });
     live_ = std::make_unique<LiveStage>(make_, bus_);
-    if (!memory.empty()) live_->remember_in(memory);
+    if (!memory.empty()) live_->keep_memory_in(memory);
   }
 
   void play(const DriveMessage& message) { bus_.publish(message.channel, message.bytes); }

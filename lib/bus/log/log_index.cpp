@@ -45,7 +45,7 @@ LogIndex index_logs(const std::vector<LogReader*>& readers,
   return index;
 }
 
-void drop_copies(LogIndex& index, const std::vector<LogReader*>& readers) {
+void remove_duplicates(LogIndex& index, const std::vector<LogReader*>& readers) {
   const auto bytes = [&](const IndexedMessage& m) {
     return readers[static_cast<std::size_t>(m.file)]->at(m.offset).data;
   };

@@ -34,6 +34,6 @@ LogIndex index_logs(const std::vector<LogReader*>& readers,
 
 /// Two hosts, a recorder on each: most messages are in both recordings. Leaves one of the copies, which are alike to
 /// the byte and in different files.
-void drop_copies(LogIndex& index, const std::vector<LogReader*>& readers);
+void remove_duplicates(LogIndex& index, const std::vector<LogReader*>& readers);
 
 }  // namespace roadfix

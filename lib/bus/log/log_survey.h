@@ -38,7 +38,7 @@ struct LogSurvey {
 LogSurvey survey_log(LogReader& reader);
 
 /// Throws LogError where the file is no log, holds no event, or none of a type of ours: another LCM user's. Stands at
-/// the beginning then. A log of ours tells at its first event.
+/// the beginning then. For a log of ours its first event is enough.
 void require_our_log(LogReader& reader);
 
 }  // namespace roadfix

@@ -16,7 +16,7 @@ namespace {
 
 /// Small enough to be full, and so in memory, after the first second of a drive: what it takes never grows.
 constexpr std::size_t kBufferBytes = std::size_t{64} << 10;
-constexpr const char* kNotTaken = "cannot write the log";
+constexpr const char* kWriteFailed = "cannot write the log";
 
 void store(uint8_t* to, uint64_t value, int size) {
   for (int i = 0; i < size; ++i) to[i] = static_cast<uint8_t>(value >> (8 * (size - 1 - i)));
@@ -30,7 +30,7 @@ LogWriter::LogWriter(const std::filesystem::path& path, Mode mode) : path_(path)
     const OutputPlace place = output_place(path);
     path_ = place.path;
     written_path_ = place.written;
-    refuse_what_is_no_log();
+    refuse_non_log();
   }
   fd_ = ::open(written_path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (fd_ < 0) throw_log_error(written_path_, "cannot create the log");
@@ -43,7 +43,7 @@ LogWriter::LogWriter(const std::filesystem::path& path, Mode mode) : path_(path)
 }
 
 /// A slip of the finger in --out must not cost a calibration or a table.
-void LogWriter::refuse_what_is_no_log() const {
+void LogWriter::refuse_non_log() const {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path_, ignored) || std::filesystem::file_size(path_, ignored) == 0) return;
   if (!LogReader(path_).next()) throw LogError(path_.string() + ": is there and no log; it would be replaced");
@@ -57,7 +57,7 @@ LogWriter::~LogWriter() {
     try {
       flush(false);
     } catch (const LogError&) {
-      // A destructor cannot report; whoever wants to know calls commit().
+      // A destructor cannot report; commit() does.
     }
   }
   ::close(fd_);
@@ -85,7 +85,7 @@ void LogWriter::put(const void* data, std::size_t size) {
   const auto* begin = static_cast<const uint8_t*>(data);
   if (size > kBufferBytes) {
     // A buffer that took it would keep the size of the largest message ever.
-    if (hand_out({begin, size}) < size) throw_log_error(written_path_, kNotTaken);
+    if (write_some({begin, size}) < size) throw_log_error(written_path_, kWriteFailed);
   } else {
     buffer_.insert(buffer_.end(), begin, begin + size);
   }
@@ -93,8 +93,8 @@ void LogWriter::put(const void* data, std::size_t size) {
   hash_.add(data, size);
 }
 
-/// How much of it the system took; less than all: errno says why.
-std::size_t LogWriter::hand_out(std::span<const uint8_t> data) const {
+/// How much of it the system took; less than all: errno has the reason.
+std::size_t LogWriter::write_some(std::span<const uint8_t> data) const {
   std::size_t done = 0;
   while (done < data.size()) {
     const ssize_t n = ::write(fd_, data.data() + done, data.size() - done);
@@ -106,14 +106,14 @@ std::size_t LogWriter::hand_out(std::span<const uint8_t> data) const {
 }
 
 void LogWriter::flush(bool to_disk) {
-  if (const std::size_t done = hand_out(buffer_); done < buffer_.size()) {
+  if (const std::size_t done = write_some(buffer_); done < buffer_.size()) {
     const int why = errno;
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(done));
     errno = why;
-    throw_log_error(written_path_, kNotTaken);
+    throw_log_error(written_path_, kWriteFailed);
   }
   buffer_.clear();
-  if (to_disk && ::fdatasync(fd_) != 0 && errno != EINVAL) throw_log_error(written_path_, kNotTaken);
+  if (to_disk && ::fdatasync(fd_) != 0 && errno != EINVAL) throw_log_error(written_path_, kWriteFailed);
 }
 
 void LogWriter::commit(bool to_disk) {

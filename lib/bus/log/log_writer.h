@@ -41,9 +41,9 @@ class LogWriter {
   [[nodiscard]] uint64_t hash() const { return hash_.value(); }
 
  private:
-  void refuse_what_is_no_log() const;
+  void refuse_non_log() const;
   void put(const void* data, std::size_t size);
-  [[nodiscard]] std::size_t hand_out(std::span<const uint8_t> data) const;
+  [[nodiscard]] std::size_t write_some(std::span<const uint8_t> data) const;
 
   std::filesystem::path path_;
   std::filesystem::path written_path_;

@@ -10,14 +10,14 @@ namespace roadfix {
 
 namespace {
 
-constexpr int kLookedAt = 1000;
+constexpr int kInspectedEvents = 1000;
 /// Recorded this much later than stamped: while an old drive was played.
 constexpr int64_t kPlayed_us = 5'000'000;
 
 /// What to add to a log's times so that they are those of its messages.
 int64_t shift_of(LogReader& reader) {
   std::vector<int64_t> lags;
-  for (int i = 0; i < kLookedAt; ++i) {
+  for (int i = 0; i < kInspectedEvents; ++i) {
     const std::optional<LogEvent> event = reader.next();
     if (!event) break;
     const std::optional<Header> header = read_header(event->data);

@@ -1,5 +1,5 @@
 /// Messages whose stamp cannot be meant: a bit that flipped, a clock that was not set yet. In the order of utime such a
-/// message stands far from its place, and whatever believes its seq there takes all others of its channel for old ones.
+/// message stands far from its place, and whatever uses its seq there takes all others of its channel for old ones.
 #pragma once
 
 #include <cstdint>

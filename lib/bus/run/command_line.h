@@ -1,5 +1,5 @@
-/// The command line that all of our processes on the bus share: the same options with the same words, and the same exit
-/// status: 0, 2 for what the user can mend (said on stderr as "NAME: ..."), or what the process itself returns.
+/// The command line that all of our processes on the bus share: the same options with the same texts, and the same exit
+/// status: 0, 2 for what the user can mend (printed to stderr as "NAME: ..."), or what the process itself returns.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,7 @@ class CommandLine {
   void add_logs(const std::string& help_in, const std::string& help_out);
   void add_overwrite();
 
-  /// Reads the arguments and works. What `work` throws is told to the user.
+  /// Reads the arguments and works. What `work` throws is printed for the user.
   int run(int argc, char** argv, const std::function<int()>& work);
 
   std::string config;  ///< the vehicle's folder
@@ -44,7 +44,7 @@ class CommandLine {
 };
 
 /// The exit status after an application's parse() has thrown: prints the help or the version that was asked for, or
-/// says under `name` what is wrong with the arguments. A RuntimeError is a status alone: what it means was said.
+/// prints under `name` what is wrong with the arguments. A RuntimeError is a status alone: its meaning was printed.
 int end_of_parsing(const CLI::App& app, const CLI::ParseError& error, const std::string& name);
 
 }  // namespace roadfix

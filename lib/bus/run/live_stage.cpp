@@ -10,11 +10,11 @@ namespace roadfix {
 namespace {
 constexpr int64_t kHeartbeat_us = 1'000'000;
 constexpr int64_t kConfig_us = 10'000'000;
-/// A change of state is told soon after it happened, not with the next heartbeat.
-constexpr int64_t kLook_us = 100'000;
-/// What a message caused (two publishers, an overload) is told for this long.
-constexpr int64_t kTrouble_us = 700'000;
-/// Without a tick for this long a stage says so; shorter gaps are ordinary.
+/// A change of state is reported soon after it happened, not with the next heartbeat.
+constexpr int64_t kCheck_us = 100'000;
+/// What a message caused (two publishers, an overload) is reported for this long.
+constexpr int64_t kWarning_us = 700'000;
+/// Without a tick for this long a stage reports it; shorter gaps are ordinary.
 constexpr int64_t kNoClock_us = 1'000'000;
 }  // namespace
 
@@ -24,7 +24,7 @@ LiveStage::LiveStage(std::function<std::unique_ptr<Stage>()> make, Bus& bus)
       runner_(std::make_unique<StageRunner>(make_(), *this)),
       overload_(runner_->spec().overload),
       lateness_(runner_->spec().inputs),
-      step_back_(runner_->spec().inputs.size()) {
+      backward_stamps_(runner_->spec().inputs.size()) {
   runner_->measure_time();
   started_us_ = clock_.now_utime();
   const std::vector<InputSpec>& inputs = runner_->spec().inputs;
@@ -45,43 +45,43 @@ void LiveStage::take(int input, std::span<const uint8_t> bytes) {
     }
   }
   if (header && is_plausible(*header) && is_clock(input)) {
-    if (steps_ahead(input, header->utime) && runner_->can_decode(input, bytes)) begin_again(header->utime);
-    if (memory_) recall(header->utime);
+    if (jumps_ahead(input, header->utime) && runner_->can_decode(input, bytes)) restart(header->utime);
+    if (memory_) publish_memory(header->utime);
     begin_horizon(header->utime);
   }
   const Offer offer = runner_->offer(input, bytes);
   if ((offer == Offer::kWaits || offer == Offer::kLate) && input != horizon_input(runner_->spec())) {
-    watch_lateness(input, header->utime);
+    update_lateness(input, header->utime);
   }
   if (offer == Offer::kTick) {
     last_tick_us_ = clock_.now_utime();
-    step_back_.forget();
+    backward_stamps_.reset();
     return;
   }
   const std::optional<int64_t> now = runner_->stream().clock_utime();
   if (offer == Offer::kWaits || !header || !now || !is_clock(input) || !runner_->can_decode(input, bytes)) return;
-  if (!step_back_.confirmed_by(input, *header, *now)) return;
-  begin_again(header->utime);
+  if (!backward_stamps_.detect(input, *header, *now)) return;
+  restart(header->utime);
   begin_horizon(header->utime);
   runner_->offer(input, bytes);
 }
 
 /// Whether the stamps have gone ahead, and not the time: after a silence as long as their leap the stage goes on.
-bool LiveStage::steps_ahead(int input, int64_t utime) {
+bool LiveStage::jumps_ahead(int input, int64_t utime) {
   const InputStream& stream = runner_->stream();
   if (!stream.confirms_jump(input, utime)) return false;
   const int64_t silent_us = clock_.now_utime() - last_tick_us_;
   return utime - *stream.clock_utime() - silent_us > ClockSelector::kJump_us / 2;
 }
 
-void LiveStage::remember_in(const std::filesystem::path& file) {
+void LiveStage::keep_memory_in(const std::filesystem::path& file) {
   if (memory_input(runner_->spec()) < 0) return;
   memory_file_ = file;
   memory_ = read_memory(file, runner_->spec());
 }
 
 /// As old as the horizon will be after the first clock sample: the first input to be applied.
-void LiveStage::recall(int64_t first_utime) {
+void LiveStage::publish_memory(int64_t first_utime) {
   memory_->utime = first_utime - largest_lateness_us(runner_->spec().inputs);
   memory_->run = clock_.run();
   memory_->seq = 0;
@@ -109,14 +109,14 @@ void LiveStage::allow_lateness(int64_t utime, int64_t lateness_us) {
   runner_->offer(horizon_input(runner_->spec()), bytes);
 }
 
-void LiveStage::watch_lateness(int input, int64_t utime) {
+void LiveStage::update_lateness(int input, int64_t utime) {
   const std::optional<int64_t> now = runner_->stream().clock_utime();
   if (!horizon_run_ || !now) return;
   lateness_.note(input, *now, utime);
   if (const std::optional<int64_t> lateness_us = lateness_.change(*now)) allow_lateness(*now, *lateness_us);
 }
 
-void LiveStage::remember() {
+void LiveStage::save_memory() {
   if (memory_file_.empty() || !runner_->stream().clock_utime()) return;
   state_t memory{};
   memory.state = runner_->stage().memory();
@@ -127,9 +127,9 @@ void LiveStage::remember() {
   memory.layout = runner_->spec().state_layout;
   try {
     write_memory(memory_file_, memory);
-    memory_trouble_.clear();
+    memory_error_.clear();
   } catch (const std::runtime_error& e) {
-    memory_trouble_ = e.what();  // the drive goes on without
+    memory_error_ = e.what();  // the drive goes on without
   }
 }
 
@@ -140,7 +140,7 @@ bool LiveStage::is_clock(int input) const {
 
 /// A new run, as if the process had been started anew. A log may be played for the third time: no two runs have one
 /// name.
-void LiveStage::begin_again(int64_t utime) {
+void LiveStage::restart(int64_t utime) {
   const int64_t ahead_us = utime - *runner_->stream().clock_utime();
   runs_.insert(*runner_->stream().run());
   runner_ = std::make_unique<StageRunner>(make_(), *this);
@@ -151,14 +151,14 @@ void LiveStage::begin_again(int64_t utime) {
   overload_ = OverloadSkipper(runner_->spec().overload);
   lateness_ = LatenessEstimator(runner_->spec().inputs);
   horizon_run_.reset();
-  step_back_.forget();
-  began_because_ = std::string("the stamps went ") + (ahead_us > 0 ? "ahead" : "back") + " by " +
-                   std::to_string(std::abs(ahead_us) / 1'000'000) + " s: a new run";
+  backward_stamps_.reset();
+  restart_reason_ = std::string("the stamps went ") + (ahead_us > 0 ? "ahead" : "back") + " by " +
+                    std::to_string(std::abs(ahead_us) / 1'000'000) + " s: a new run";
 }
 
-bool LiveStage::step(std::chrono::milliseconds patience) {
+bool LiveStage::step(std::chrono::milliseconds timeout) {
   publish_due();
-  const bool more = bus_.handle(patience);
+  const bool more = bus_.handle(timeout);
   publish_due();
   return more;
 }
@@ -167,24 +167,24 @@ void LiveStage::publish_due() {
   const int64_t now = clock_.now_utime();
   if (now >= next_config_us_) {
     publish_config(now);
-    remember();
+    save_memory();
     next_config_us_ = now + kConfig_us;
   }
-  if (now >= next_look_us_) {
-    next_look_us_ = now + kLook_us;
-    note_trouble(now);
-    if (state(now).first != told_state_) next_heartbeat_us_ = now;
+  if (now >= next_check_us_) {
+    next_check_us_ = now + kCheck_us;
+    check_counters(now);
+    if (state(now).first != reported_state_) next_heartbeat_us_ = now;
   }
   if (now >= next_heartbeat_us_) {
-    note_trouble(now);
+    check_counters(now);
     publish_heartbeat(now, false);
     next_heartbeat_us_ = now + kHeartbeat_us;
   }
 }
 
 void LiveStage::stop() {
-  remember();
-  note_trouble(clock_.now_utime());
+  save_memory();
+  check_counters(clock_.now_utime());
   publish_heartbeat(clock_.now_utime(), true);
 }
 
@@ -192,29 +192,29 @@ void LiveStage::put(const std::string& channel, const Header&, std::span<const u
   bus_.publish(channel, bytes);
 }
 
-/// What the counters say beside the last look: what happened once and is over is no trouble any more.
-void LiveStage::note_trouble(int64_t now_utime) {
+/// Compares the counters with those of the last check: what happened once and is over is no warning any more.
+void LiveStage::check_counters(int64_t now_utime) {
   const std::vector<InputSpec>& inputs = runner_->spec().inputs;
   counted_.resize(inputs.size());
-  for (std::size_t i = inputs.size(); i-- > 0;) {  // of several the first one's is told
+  for (std::size_t i = inputs.size(); i-- > 0;) {  // of several the first one's is reported
     const InputCounters& counters = runner_->stream().track(static_cast<int>(i)).counters;
     if (counters.skipped > counted_[i].skipped) {
-      trouble_ = inputs[i].channel + ": too fast for this stage, " + std::to_string(counters.skipped) + " skipped";
-      trouble_until_us_ = now_utime + kTrouble_us;
+      warning_ = inputs[i].channel + ": too fast for this stage, " + std::to_string(counters.skipped) + " skipped";
+      warning_until_us_ = now_utime + kWarning_us;
     }
     if (counters.conflicts > counted_[i].conflicts) {
-      trouble_ = inputs[i].channel + ": two publishers, or a log played again with old names";
-      trouble_until_us_ = now_utime + kTrouble_us;
+      warning_ = inputs[i].channel + ": two publishers, or a log played again with old names";
+      warning_until_us_ = now_utime + kWarning_us;
     }
     counted_[i] = counters;
   }
   unsent_.note(now_utime, bus_.unsent());
 }
 
-/// A network that is gone takes the inputs with it: what was not sent is told beside whatever else is the matter.
+/// A network that is gone takes the inputs with it: what was not sent is reported beside other reasons.
 std::pair<int8_t, std::string> LiveStage::state(int64_t now_utime) const {
   std::pair<int8_t, std::string> all = state_of_inputs(now_utime);
-  const std::string unsent = unsent_.trouble(now_utime);
+  const std::string unsent = unsent_.state_reason(now_utime);
   if (unsent.empty()) return all;
   if (all.first == heartbeat_t::STATE_RUNNING) all.first = heartbeat_t::STATE_DEGRADED;
   all.second += (all.second.empty() ? "" : "; ") + unsent;
@@ -231,9 +231,9 @@ std::pair<int8_t, std::string> LiveStage::state_of_inputs(int64_t now_utime) con
     return {heartbeat_t::STATE_NO_CLOCK, "no newer sample on " + clocks};
   }
   if (!stream.clock_utime()) return {heartbeat_t::STATE_STARTING, "waits for its clock"};
-  if (now_utime < trouble_until_us_) return {heartbeat_t::STATE_DEGRADED, trouble_};
-  if (!memory_trouble_.empty()) return {heartbeat_t::STATE_DEGRADED, memory_trouble_};
-  return {heartbeat_t::STATE_RUNNING, began_because_};
+  if (now_utime < warning_until_us_) return {heartbeat_t::STATE_DEGRADED, warning_};
+  if (!memory_error_.empty()) return {heartbeat_t::STATE_DEGRADED, memory_error_};
+  return {heartbeat_t::STATE_RUNNING, restart_reason_};
 }
 
 void LiveStage::publish_heartbeat(int64_t now_utime, bool stopping) {
@@ -242,7 +242,7 @@ void LiveStage::publish_heartbeat(int64_t now_utime, bool stopping) {
   heartbeat.run = clock_.run();
   heartbeat.seq = heartbeat_seq_++;
   std::tie(heartbeat.state, heartbeat.state_reason) = state(now_utime);
-  told_state_ = heartbeat.state;
+  reported_state_ = heartbeat.state;
   if (stopping) heartbeat.state = heartbeat_t::STATE_STOPPING;
   heartbeat.cpu_share = load_.cpu_share();
   heartbeat.rss_bytes = resident_bytes();

@@ -176,7 +176,7 @@ void Replayer::require_clock(const StageRunner& runner) const {
   }
   std::string text = reader_.path().string() + ": " + runner.spec().name + " needs a message on " + clocks;
   text += broken ? ", and the log has none that can be decoded" : ", and the log has none";
-  // The first damage may be why; a thousand more say nothing else.
+  // The first damage may be why; a thousand more add nothing.
   if (const std::vector<LogDamage>& damage = reader_.damage(); !damage.empty()) {
     text += "; it is damaged at byte " + std::to_string(damage[0].offset) + " (" + damage[0].what + ")";
     if (damage.size() > 1) text += " and in " + std::to_string(damage.size() - 1) + " more places";

@@ -28,7 +28,7 @@ void run_live(const CommandLine& arguments, const std::string& memory, const Mak
   if (!memory.empty()) {
     try {
       std::filesystem::create_directories(memory);
-      live.remember_in(std::filesystem::path(memory) / (name + ".state"));
+      live.keep_memory_in(std::filesystem::path(memory) / (name + ".state"));
     } catch (const std::runtime_error& e) {
       std::cerr << name << ": begins without what it knew: " << e.what() << "\n";
     }

@@ -14,7 +14,7 @@ namespace roadfix {
 
 using MakeStage = std::function<std::unique_ptr<Stage>(const std::filesystem::path& vehicle_dir)>;
 
-/// The exit status: 0, or 2 for what the user can mend (said on stderr).
+/// The exit status: 0, or 2 for what the user can mend (printed to stderr).
 int run_process(int argc, char** argv, const MakeStage& make);
 
 /// Set by SIGINT and SIGTERM once this was called; the second signal of a kind ends the process at once.

@@ -65,7 +65,7 @@ void ServiceNotifier::alive() {
 
 void ServiceNotifier::stopping() { send("STOPPING=1"); }
 
-void give_memory_back() {
+void release_free_memory() {
   constexpr int kLarge_bytes = 16 << 10;
   constexpr int kHeaps = 2;
   ::mallopt(M_MMAP_THRESHOLD, kLarge_bytes);

@@ -1,4 +1,4 @@
-/// What a process owes to the service manager that started it, and to the scheduler: signs of life from its message
+/// What a process owes to the service manager that started it, and to the scheduler: heartbeats from its message
 /// loop, and real time where it is asked for.
 #pragma once
 
@@ -19,7 +19,7 @@ class ServiceNotifier {
 
   /// Bus and configuration are there: what waits for this process may start.
   void ready(const std::string& status);
-  /// From the message loop, each time around: feeds the watchdog, at most four times within its patience.
+  /// From the message loop, each time around: feeds the watchdog, at most four times within its time-out.
   void alive();
   void stopping();
 
@@ -28,16 +28,16 @@ class ServiceNotifier {
 
   int socket_ = -1;
   std::string address_;
-  std::chrono::steady_clock::duration period_{};  ///< between two signs of life; 0: nobody waits for them
+  std::chrono::steady_clock::duration period_{};  ///< between two heartbeats; 0: nobody waits for them
   std::chrono::steady_clock::time_point due_{};
 };
 
 /// Makes the C library give large buffers back at once. By itself it learns from the first snapshot of a megabyte to
 /// keep such buffers in the heap, where the small messages between them hold the rest for ever.
-void give_memory_back();
+void release_free_memory();
 
 /// SCHED_FIFO at `priority` (1 to 99) for this thread and those it will start, and memory that is never paged out.
-/// Throws std::runtime_error that says what allows it. Other processes wait while this one runs: on request only.
+/// Throws std::runtime_error that names what allows it. Other processes wait while this one runs: on request only.
 void make_realtime(int priority);
 
 /// Whether make_realtime() would do it; tried in a process of its own. For programs without threads.

@@ -100,7 +100,7 @@ int delivery_order(const StageSpec& spec, int input);
 /// that a loss by the logger may cost.
 constexpr int64_t kSnapshot_us = 9'000'000;
 
-/// The input that tells how late the others may be, of type horizon_t on HORIZON_<PROCESS>, which the runner takes
+/// The input that sets how late the others may be, of type horizon_t on HORIZON_<PROCESS>, which the runner takes
 /// itself; -1 where the stage declares none: its horizon stays the largest lateness behind the clock.
 int horizon_input(const StageSpec& spec);
 

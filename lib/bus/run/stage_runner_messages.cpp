@@ -1,4 +1,4 @@
-// What a stage says of itself beside its outputs: ledger, snapshots, configuration.
+// What a stage publishes beside its outputs: ledger, snapshots, configuration.
 #include <cctype>
 
 #include "bus/run/process_facts.h"

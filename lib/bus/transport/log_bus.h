@@ -17,7 +17,7 @@ class LogBus : public Bus {
 
   void subscribe(const std::string& channels, Handler handler, const QueuePolicy& policy = {}) override;
   void publish(const std::string& channel, std::span<const uint8_t> bytes) override;
-  bool handle(std::chrono::milliseconds patience) override;
+  bool handle(std::chrono::milliseconds timeout) override;
 
   [[nodiscard]] const LogReader& reader() const { return reader_; }
 

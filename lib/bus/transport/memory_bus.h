@@ -13,7 +13,7 @@ class MemoryBus : public Bus {
   void subscribe(const std::string& channels, Handler handler, const QueuePolicy& policy = {}) override;
   void publish(const std::string& channel, std::span<const uint8_t> bytes) override;
   /// Never waits; false where nothing was there.
-  bool handle(std::chrono::milliseconds patience) override;
+  bool handle(std::chrono::milliseconds timeout) override;
   [[nodiscard]] std::vector<QueueStatus> queues() const override;
 
  private:

@@ -27,7 +27,7 @@ std::string with_receive_buffer(const std::string& url) {
          "recv_buf_size=" + std::to_string(kReceiveBufferBytes);
 }
 
-/// The port of udpm://GROUP:PORT?...; LCM's own where the URL does not say; 0 for another provider.
+/// The port of udpm://GROUP:PORT?...; LCM's own where the URL has none; 0 for another provider.
 int port_of(const std::string& url) {
   if (!url.starts_with("udpm://")) return 0;
   const std::string address = url.substr(7, url.find('?') - 7);
@@ -77,7 +77,7 @@ void NetworkBus::subscribe(const std::string& channels, Handler handler, const Q
 void NetworkBus::publish(const std::string& channel, std::span<const uint8_t> bytes) {
   if (channel.empty() || channel.size() > kMaxChannelBytes) throw BusError("no channel name: '" + channel + "'");
   if (bytes.size() > kMaxMessageBytes) throw BusError(channel + ": " + std::to_string(bytes.size()) + " bytes");
-  // Of a message in several datagrams LCM says that it was sent even where the system refused them; errno does not.
+  // Of a message in several datagrams LCM reports that it was sent even where the system refused them; errno does not.
   errno = 0;
   if (lcm_->publish(channel, bytes.data(), static_cast<unsigned>(bytes.size())) != 0 || errno != 0) ++unsent_;
 }
@@ -110,8 +110,8 @@ void NetworkBus::drain() {
   }
 }
 
-bool NetworkBus::handle(std::chrono::milliseconds patience) {
-  if (queue_.empty()) lcm_->handleTimeout(static_cast<int>(patience.count()));
+bool NetworkBus::handle(std::chrono::milliseconds timeout) {
+  if (queue_.empty()) lcm_->handleTimeout(static_cast<int>(timeout.count()));
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < kHandleAtOnce && !queue_.empty() && std::chrono::steady_clock::now() - begin < kHandleFor; ++i) {
     Waiting message = std::move(queue_.front());

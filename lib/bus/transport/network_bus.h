@@ -1,4 +1,4 @@
-/// LCM over UDP, without its silences: LCM's own queue of 30 is lifted, what waits here is bounded and counted, the
+/// LCM over UDP, without silent losses: LCM's own queue of 30 is lifted, what waits here is bounded and counted, the
 /// receive buffer is checked, the kernel's drops at our socket are read, and handlers run outside LCM's C code.
 /// One thread uses a bus. lcm_facts.md, section 0, holds the measurements behind this.
 #pragma once
@@ -16,7 +16,7 @@ namespace roadfix {
 
 inline constexpr const char* kDefaultBusUrl = "udpm://239.255.76.67:7667?ttl=0";
 
-/// What is asked of the kernel where the URL does not say: enough for raw images of a megabyte.
+/// What is asked of the kernel where the URL does not set it: enough for raw images of a megabyte.
 constexpr int kReceiveBufferBytes = 4 << 20;
 
 class NetworkBus : public Bus {
@@ -29,7 +29,7 @@ class NetworkBus : public Bus {
 
   void subscribe(const std::string& channels, Handler handler, const QueuePolicy& policy = {}) override;
   void publish(const std::string& channel, std::span<const uint8_t> bytes) override;
-  bool handle(std::chrono::milliseconds patience) override;
+  bool handle(std::chrono::milliseconds timeout) override;
   [[nodiscard]] std::vector<QueueStatus> queues() const override;
   [[nodiscard]] int64_t unsent() const override { return unsent_; }
   [[nodiscard]] int64_t kernel_drops() const override;

@@ -1,4 +1,4 @@
-/// What the kernel knows of this process's UDP sockets.
+/// What the kernel reports of this process's UDP sockets.
 #pragma once
 
 #include <cstdint>

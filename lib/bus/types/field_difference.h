@@ -1,4 +1,4 @@
-/// Names where two messages of one type differ, in words for a person.
+/// Names the first field in which two messages of one type differ.
 #pragma once
 
 #include <optional>

@@ -38,7 +38,7 @@ const std::vector<TypeRule>& released_rules();
 
 class TypeConverter {
  public:
-  /// Throws SchemaError where a rule does not say what a field becomes, or speaks of one that is not there: fields of
+  /// Throws SchemaError where a field has no rule that it needs, or a rule names one that is not there: fields of
   /// one name and type are copied, numbers of one name and another type are converted, everything else needs a rule.
   TypeConverter(const std::vector<ReleasedTypes>& released, const Schema& current, const std::vector<TypeRule>& rules);
   /// Of what this program was built with.

@@ -20,14 +20,14 @@ void LedgerRecord::take(const ledger_entry_t& entry) {
   const auto inputs = static_cast<int>(spec_.inputs.size());
   while (input < inputs && spec_.inputs[static_cast<std::size_t>(input)].channel != entry.channel) ++input;
   if (input == inputs)
-    return;  // a channel that this stage no longer has: the configurations differ, and verify says so
+    return;  // a channel that this stage no longer has: the configurations differ, which verify reports
   switch (static_cast<LedgerKind>(entry.kind)) {
     case LedgerKind::kRunBegan:
       began_[{input, entry.input_run}] = entry.first_seq;
       break;
     case LedgerKind::kClockChanged:
       clock_changes_.emplace(input, entry.input_run, entry.first_seq);
-      rests_[entry.input_utime] = entry.at_clock_utime;
+      clock_gaps_[entry.input_utime] = entry.at_clock_utime;
       break;
     case LedgerKind::kLost:
     case LedgerKind::kLate:
@@ -68,8 +68,8 @@ bool LedgerRecord::unsettled_at_end(int input, const EventId& id) const {
   if (newest && id.run < *newest) return false;  // the last seq is a later run's
   const int64_t effect_utime = id.utime + spec_.inputs[i].effect_delay_us;
   const bool recent = id.utime > last_utime_ - kEnd_us || last_seq_[i] < 0;
-  const bool went_back = i < applied_utime_.size() && id.utime < applied_utime_[i] - kEnd_us;
-  return (recent || went_back) && effect_utime <= last_utime_ - lateness_us_;
+  const bool is_backward = i < applied_utime_.size() && id.utime < applied_utime_[i] - kEnd_us;
+  return (recent || is_backward) && effect_utime <= last_utime_ - lateness_us_;
 }
 
 bool LedgerRecord::excludes(int input, const EventId& id) const {
@@ -96,8 +96,8 @@ bool LedgerRecord::changes_clock(int input, const EventId& id) const {
 }
 
 bool LedgerRecord::clock_suspended(int64_t utime) const {
-  const auto after = rests_.lower_bound(utime);
-  return after != rests_.begin() && utime <= std::prev(after)->second;
+  const auto after = clock_gaps_.lower_bound(utime);
+  return after != clock_gaps_.begin() && utime <= std::prev(after)->second;
 }
 
 int64_t LedgerRecord::entries_at(int64_t clock_utime) const {

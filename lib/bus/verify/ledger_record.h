@@ -23,7 +23,7 @@ class LedgerRecord : public RecordedDecisions {
   /// Entries up to this number, and these runs of the inputs, are in the state that verify goes on from.
   void begin_from(int64_t entries, const std::vector<std::pair<int, int64_t>>& input_runs);
 
-  /// The run ended with this output: what its ledger had no time to tell. Inputs of the last 10 s that the horizon had
+  /// The run ended with this output: what its ledger had no time for. Inputs of the last 10 s that the horizon had
   /// passed, but that lie behind the last ones applied, were not there in time; nor were older ones of a channel of
   /// which none was ever applied; nor what has later numbers and much older stamps than the last ones applied: the
   /// stamps went back, and another run of the stage took it. `applied_utime`: per input, of the last one applied, as
@@ -36,7 +36,7 @@ class LedgerRecord : public RecordedDecisions {
   [[nodiscard]] bool clock_suspended(int64_t utime) const override;
   [[nodiscard]] int64_t entries_at(int64_t clock_utime) const override;
 
-  /// Whether the ledger says that the stage never used this message.
+  /// Whether the stage never used this message, by the ledger.
   [[nodiscard]] bool excludes(int input, const EventId& id) const;
   /// First seq that the stage took of this run, where its beginning is recorded.
   [[nodiscard]] std::optional<int64_t> began_at(int input, int64_t run) const;
@@ -58,14 +58,14 @@ class LedgerRecord : public RecordedDecisions {
   void take(const ledger_entry_t& entry);
 
   const StageSpec& spec_;
-  int64_t total_ = 0;  // as the messages say
+  int64_t total_ = 0;  // of the messages
   std::set<int64_t> numbers_;
   std::map<int64_t, int64_t> newest_at_;  // the highest number entered at each clock sample
   std::map<InputRun, std::vector<Range>> excluded_;
   std::map<InputRun, int64_t> began_;
   std::set<InputRun> known_runs_;
   std::set<std::tuple<int, int64_t, int64_t>> clock_changes_;
-  std::map<int64_t, int64_t> rests_;  // from the last tick before a change of clock to the change
+  std::map<int64_t, int64_t> clock_gaps_;  // from the last tick before a change of clock to the change
   int64_t base_ = 0;
   int64_t last_utime_ = 0;  // 0: the end is not known
   std::vector<int64_t> last_seq_;

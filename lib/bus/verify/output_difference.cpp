@@ -18,7 +18,7 @@ std::string joined(std::initializer_list<std::string_view> parts) {
   return all;
 }
 
-std::string seqs_in_words(int64_t first, int64_t last) {
+std::string format_seqs(int64_t first, int64_t last) {
   if (first == last) return "seq " + std::to_string(first);
   return "seq " + std::to_string(first) + " to " + std::to_string(last);
 }
@@ -29,8 +29,7 @@ std::string newly_applied(const StageSpec& spec, const provenance_t& now, const 
   for (std::size_t i = 0; i < now.last_seq.size() && i < spec.inputs.size(); ++i) {
     const int64_t old_seq = before && i < before->last_seq.size() ? before->last_seq[i] : -1;
     if (now.last_seq[i] == old_seq) continue;
-    text +=
-        joined({text.empty() ? "" : ", ", spec.inputs[i].channel, " ", seqs_in_words(old_seq + 1, now.last_seq[i])});
+    text += joined({text.empty() ? "" : ", ", spec.inputs[i].channel, " ", format_seqs(old_seq + 1, now.last_seq[i])});
   }
   return text.empty() ? "nothing" : text;
 }
@@ -91,7 +90,7 @@ std::map<std::string, std::string> versions(const std::string& text) {
 
 }  // namespace
 
-std::string difference_in_words(const StageSpec& spec, const RecordedOutput& recorded,
+std::string describe_difference(const StageSpec& spec, const RecordedOutput& recorded,
                                 std::span<const uint8_t> replayed, const RecordedOutput* before) {
   const OutputSpec& output = spec.outputs[static_cast<std::size_t>(recorded.output)];
   std::string text = output.channel + " seq " + std::to_string(recorded.header.seq) + " at utime " +
@@ -109,13 +108,13 @@ std::string difference_in_words(const StageSpec& spec, const RecordedOutput& rec
   return text + "; " + cause(spec, *car, *here, provenance_of(spec, before));
 }
 
-std::string loss_in_words(const StageSpec& spec, const LogLoss& loss) {
+std::string describe_loss(const StageSpec& spec, const LogLoss& loss) {
   const std::string& channel = spec.inputs[static_cast<std::size_t>(loss.input)].channel;
   if (loss.last_seq == std::numeric_limits<int64_t>::max()) return channel + ": not in the log";
   if (loss.first_seq == std::numeric_limits<int64_t>::min()) {
     return channel + ": the log begins with seq " + std::to_string(loss.last_seq + 1);
   }
-  return channel + ": " + seqs_in_words(loss.first_seq, loss.last_seq) + " not in the log";
+  return channel + ": " + format_seqs(loss.first_seq, loss.last_seq) + " not in the log";
 }
 
 std::vector<std::string> config_differences(const config_t& car, const config_t& here) {
@@ -123,11 +122,11 @@ std::vector<std::string> config_differences(const config_t& car, const config_t&
   if (car.build_id != here.build_id) {
     differences.push_back("build: " + car.build_id + " in the car, " + here.build_id + " here");
   }
-  const std::map<std::string, std::string> car_versions = versions(car.library_versions);
-  const std::map<std::string, std::string> here_versions = versions(here.library_versions);
-  for (const auto& [name, version] : car_versions) {
-    const auto found = here_versions.find(name);
-    if (found != here_versions.end() && found->second != version) {
+  const std::map<std::string, std::string> recorded_versions = versions(car.library_versions);
+  const std::map<std::string, std::string> local_versions = versions(here.library_versions);
+  for (const auto& [name, version] : recorded_versions) {
+    const auto found = local_versions.find(name);
+    if (found != local_versions.end() && found->second != version) {
       differences.push_back(joined({"library ", name, ": ", version, " in the car, ", found->second, " here"}));
     }
   }

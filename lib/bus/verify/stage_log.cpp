@@ -119,8 +119,8 @@ void find_in_sequence(const StageRun& run, int input, int64_t input_run, const S
 
 /// Where the stamps went back under a driver that went on, its later numbers lie among the stamps of a run of the stage
 /// that had ended. Lost ones behind the last that this run took are none of its own.
-void leave_out_later(const StageSpec& spec, const StageLog& log, const StageRun& run, const provenance_t& provenance,
-                     std::vector<LogLoss>& losses) {
+void exclude_later(const StageSpec& spec, const StageLog& log, const StageRun& run, const provenance_t& provenance,
+                   std::vector<LogLoss>& losses) {
   std::map<int, int64_t> last_taken;
   for (std::size_t i = 0; i < spec.inputs.size() && i < provenance.last_seq.size(); ++i) {
     last_taken[static_cast<int>(i)] = provenance.last_seq[i];
@@ -175,7 +175,7 @@ std::vector<LogLoss> find_losses(const StageSpec& spec, const StageLog& log, con
   const RecordedOutput& last = run.outputs.back();
   const std::string& type = spec.outputs[static_cast<std::size_t>(last.output)].type;
   const std::optional<provenance_t> provenance = read_provenance(type, last.bytes);
-  if (provenance) leave_out_later(spec, log, run, *provenance, losses);
+  if (provenance) exclude_later(spec, log, run, *provenance, losses);
   for (std::size_t i = 0; provenance && i < sequences.size() && i < provenance->last_seq.size(); ++i) {
     if (provenance->last_seq[i] < 0) continue;
     const int input = static_cast<int>(i);

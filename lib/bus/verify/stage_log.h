@@ -42,13 +42,13 @@ struct StageRun {
 struct StageLog {
   std::vector<LoggedInput> inputs;   ///< by utime, and at one utime as a stage is given them
   std::map<int64_t, StageRun> runs;  ///< by run
-  std::vector<std::string> damage;   ///< messages that failed their check, in words
+  std::vector<std::string> damage;   ///< messages that failed their check, as text
 };
 
 /// `readers` must outlive the result.
 StageLog collect_stage_log(const StageSpec& spec, const std::vector<LogReader*>& readers, const LogIndex& index);
 
-/// What a message says it was computed from; nothing where its type has no provenance. The message must have passed its
+/// What a message was computed from, by its provenance; nothing where its type has none. It must have passed its
 /// check.
 std::optional<provenance_t> read_provenance(const std::string& type, std::span<const uint8_t> bytes);
 

@@ -51,7 +51,7 @@ StageVerdict verify_stage(const NewStage& new_stage, const std::vector<LogReader
   const std::set<std::string> channels = channels_of(spec);
   LogIndex index =
       index_logs(readers, [&](std::string_view channel) { return channels.contains(std::string(channel)); });
-  if (readers.size() > 1) drop_copies(index, readers);
+  if (readers.size() > 1) remove_duplicates(index, readers);
   StageVerdict verdict;
   verdict.stage = spec.name;
   StageLog log = collect_stage_log(spec, readers, index);

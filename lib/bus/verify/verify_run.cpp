@@ -24,7 +24,7 @@ class RunVerifier : public MessageSink {
       by_name_.emplace(std::pair(run.outputs[i].output, run.outputs[i].header.seq), i);
     }
     end_ledger();
-    for (const LogLoss& loss : losses_) blind_from_.push_back(blind_from(loss));
+    for (const LogLoss& loss : losses_) affected_from_.push_back(affected_from(loss));
   }
 
   RunVerdict verify();
@@ -37,13 +37,13 @@ class RunVerifier : public MessageSink {
   };
 
   void end_ledger();
-  [[nodiscard]] int64_t blind_from(const LogLoss& loss) const;
+  [[nodiscard]] int64_t affected_from(const LogLoss& loss) const;
   bool begin(const Start& start);
   [[nodiscard]] bool holds(const LogLoss& loss) const;
-  [[nodiscard]] int64_t sight_ends() const;
+  [[nodiscard]] int64_t first_affected() const;
   int64_t run_until(const Start& start, int64_t end);
   [[nodiscard]] int64_t next_state_after(int64_t utime) const;
-  void judge_unpublished(int64_t after, int64_t until);
+  void check_unpublished(int64_t after, int64_t until);
   void put(const std::string& channel, const Header& header, std::span<const uint8_t> bytes) override;
   void describe(const RecordedOutput& recorded, std::span<const uint8_t> replayed);
 
@@ -53,7 +53,7 @@ class RunVerifier : public MessageSink {
   int64_t name_;
   StageRun& run_;
   std::vector<LogLoss> losses_;
-  std::vector<int64_t> blind_from_;  // per loss: outputs from this utime on may depend on it
+  std::vector<int64_t> affected_from_;  // per loss: outputs from this utime on may depend on it
   std::map<std::pair<int, int64_t>, std::size_t> by_name_;
   std::unique_ptr<StageRunner> runner_;
   int64_t compared_from_ = kNever;     // outputs up to this utime belong to the state that was loaded
@@ -94,8 +94,8 @@ void RunVerifier::end_ledger() {
 }
 
 /// A clock sample acts when it comes. Another input acts when the horizon passes it: the first output that had applied
-/// it, or what lies behind it, says when.
-int64_t RunVerifier::blind_from(const LogLoss& loss) const {
+/// it, or what lies behind it, bounds the time.
+int64_t RunVerifier::affected_from(const LogLoss& loss) const {
   const bool is_clock = std::any_of(spec_.clocks.begin(), spec_.clocks.end(),
                                     [&](const ClockSpec& clock) { return clock.input == loss.input; });
   if (loss.after_utime == kNever) return kNever;
@@ -146,10 +146,10 @@ bool RunVerifier::holds(const LogLoss& loss) const {
   return applied && (applied->run > loss.run || (applied->run == loss.run && applied->seq >= loss.last_seq));
 }
 
-int64_t RunVerifier::sight_ends() const {
+int64_t RunVerifier::first_affected() const {
   int64_t end = kEver;
   for (std::size_t i = 0; i < losses_.size(); ++i) {
-    if (!holds(losses_[i])) end = std::min(end, blind_from_[i]);
+    if (!holds(losses_[i])) end = std::min(end, affected_from_[i]);
   }
   return end;
 }
@@ -183,7 +183,7 @@ int64_t RunVerifier::next_state_after(int64_t utime) const {
 }
 
 /// What was recorded in a stretch that was run again, and did not come again.
-void RunVerifier::judge_unpublished(int64_t after, int64_t until) {
+void RunVerifier::check_unpublished(int64_t after, int64_t until) {
   for (RecordedOutput& output : run_.outputs) {
     if (output.header.utime <= after || output.header.utime > until) continue;
     if (output.verdict == OutputVerdict::kUnverifiable) {
@@ -202,7 +202,7 @@ RunVerdict RunVerifier::verify() {
   for (const Start& start : starts) {
     if (start.state != nullptr && start.utime() < done) continue;
     if (!begin(start)) continue;
-    const int64_t end = sight_ends();
+    const int64_t end = first_affected();
     if (end <= start.utime() || end == kNever) continue;
     if (!ledger_checked) {
       const int64_t known = start.state != nullptr ? start.state->provenance.ledger_entries : 0;
@@ -214,14 +214,14 @@ RunVerdict RunVerifier::verify() {
     }
     if (start.state != nullptr) ++verdict_.resumed;
     done = run_until(start, end);
-    judge_unpublished(start.utime(), done);
+    check_unpublished(start.utime(), done);
   }
   for (const RecordedOutput& output : run_.outputs) {
     verdict_.identical += output.verdict == OutputVerdict::kIdentical ? 1 : 0;
     verdict_.differing += output.verdict == OutputVerdict::kDiffering ? 1 : 0;
     verdict_.unverifiable += output.verdict == OutputVerdict::kUnverifiable ? 1 : 0;
   }
-  for (const LogLoss& loss : losses_) verdict_.losses.push_back(loss_in_words(spec_, loss));
+  for (const LogLoss& loss : losses_) verdict_.losses.push_back(describe_loss(spec_, loss));
   return verdict_;
 }
 
@@ -247,7 +247,7 @@ void RunVerifier::describe(const RecordedOutput& recorded, std::span<const uint8
   if (!differs_at_) differs_at_ = recorded.header.utime;
   if (verdict_.first_difference) return;
   const RecordedOutput* before = last_identical_ ? &run_.outputs[*last_identical_] : nullptr;
-  verdict_.first_difference = difference_in_words(spec_, recorded, replayed, before);
+  verdict_.first_difference = describe_difference(spec_, recorded, replayed, before);
 }
 
 }  // namespace

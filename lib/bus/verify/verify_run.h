@@ -19,8 +19,8 @@ struct RunVerdict {
   int64_t differing = 0;
   int64_t unverifiable = 0;
   int64_t resumed = 0;                ///< snapshots that it went on from
-  std::vector<std::string> losses;    ///< what the log lacks, in words
-  std::vector<std::string> findings;  ///< what is wrong with ledger or snapshots, in words
+  std::vector<std::string> losses;    ///< what the log lacks, as text
+  std::vector<std::string> findings;  ///< what is wrong with ledger or snapshots, as text
   std::optional<std::string> first_difference;
 };
 

@@ -63,10 +63,10 @@ class CameraSource : public ByteSource {
     period_ = std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(1.0 / rate));
   }
 
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override {
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override {
     const bool live = is_device(config_.devices.front());
-    if (!live && due_ > SteadyClock::now() + patience) {
-      std::this_thread::sleep_for(patience);
+    if (!live && due_ > SteadyClock::now() + timeout) {
+      std::this_thread::sleep_for(timeout);
       return ReadState::kNothing;
     }
     if (!live) std::this_thread::sleep_until(due_);

@@ -36,9 +36,9 @@ std::unique_ptr<ByteSource> open_byte_source(const DeviceConfig& config) {
 
 DescriptorSource::~DescriptorSource() { ::close(descriptor_); }
 
-ReadState DescriptorSource::read(std::chrono::milliseconds patience, std::vector<Packet>& packets) {
+ReadState DescriptorSource::read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) {
   pollfd wait{descriptor_, POLLIN, 0};
-  const int ready = ::poll(&wait, 1, static_cast<int>(patience.count()));
+  const int ready = ::poll(&wait, 1, static_cast<int>(timeout.count()));
   if (ready == 0 || (ready < 0 && errno == EINTR)) return ReadState::kNothing;
   std::array<uint8_t, kReadBytes> buffer;
   const ssize_t size = ::read(descriptor_, buffer.data(), buffer.size());

@@ -35,8 +35,8 @@ class ByteSource {
  public:
   virtual ~ByteSource() = default;
 
-  /// Waits up to `patience` for bytes and appends what is there.
-  virtual ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) = 0;
+  /// Waits up to `timeout` for bytes and appends what is there.
+  virtual ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) = 0;
 
   /// Bytes for the device (corrections); false where it takes none, or not all of them.
   virtual bool write(std::span<const uint8_t> bytes) {
@@ -81,7 +81,7 @@ class DescriptorSource : public ByteSource {
   DescriptorSource(const DescriptorSource&) = delete;
   DescriptorSource& operator=(const DescriptorSource&) = delete;
 
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override;
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override;
   bool write(std::span<const uint8_t> bytes) override;
   [[nodiscard]] std::string name() const override { return name_; }
 

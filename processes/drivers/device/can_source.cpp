@@ -39,9 +39,9 @@ class CanSource : public DescriptorSource {
   CanSource(int descriptor, std::string interface)
       : DescriptorSource(descriptor, "can:" + interface), interface_(std::move(interface)) {}
 
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override {
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override {
     pollfd wait{descriptor(), POLLIN, 0};
-    const int ready = ::poll(&wait, 1, static_cast<int>(patience.count()));
+    const int ready = ::poll(&wait, 1, static_cast<int>(timeout.count()));
     if (ready == 0 || (ready < 0 && errno == EINTR)) return ReadState::kNothing;
     Packet packet;
     for (int i = 0; i < kFramesAtOnce; ++i) {

@@ -28,14 +28,14 @@ void DeviceSession::lose(Clock::time_point now, const std::string& why) {
   due_ = now + std::chrono::duration_cast<Clock::duration>(pause_);
 }
 
-bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds patience, std::vector<Packet>& packets) {
+bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds timeout, std::vector<Packet>& packets) {
   if (ended_) return false;
   if (!source_) {
     if (!due_ || now >= *due_) return open(now);
-    std::this_thread::sleep_for(std::min<Clock::duration>(patience, *due_ - now));
+    std::this_thread::sleep_for(std::min<Clock::duration>(timeout, *due_ - now));
     return false;
   }
-  switch (source_->read(patience, packets)) {
+  switch (source_->read(timeout, packets)) {
     case ReadState::kData:
       heard_ = now;
       pause_ = pause_.zero();
@@ -52,7 +52,7 @@ bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds patien
   return false;
 }
 
-std::string DeviceSession::trouble(Clock::time_point now) const {
+std::string DeviceSession::state_reason(Clock::time_point now) const {
   if (ended_) return {};
   if (!source_) {
     if (why_.empty()) return config_.device + ": not opened yet";

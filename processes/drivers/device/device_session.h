@@ -15,14 +15,14 @@ class DeviceSession {
 
   DeviceSession(Open open, const DeviceConfig& config) : open_(std::move(open)), config_(config) {}
 
-  /// Opens what is due, or reads for up to `patience`. True where the device was opened by this call: what comes now
+  /// Opens what is due, or reads for up to `timeout`. True where the device was opened by this call: what comes now
   /// does not continue what came before.
-  bool step(Clock::time_point now, std::chrono::milliseconds patience, std::vector<Packet>& packets);
+  bool step(Clock::time_point now, std::chrono::milliseconds timeout, std::vector<Packet>& packets);
 
   /// A file that is over.
   [[nodiscard]] bool ended() const { return ended_; }
   /// In plain words, empty where bytes come.
-  [[nodiscard]] std::string trouble(Clock::time_point now) const;
+  [[nodiscard]] std::string state_reason(Clock::time_point now) const;
   [[nodiscard]] ByteSource* source() { return source_.get(); }
   [[nodiscard]] std::string name() const { return source_ ? source_->name() : config_.device; }
   [[nodiscard]] int64_t openings() const { return openings_; }

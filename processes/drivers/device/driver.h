@@ -72,7 +72,7 @@ class SensorDriver {
   virtual void take(int stream, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) = 0;
   [[nodiscard]] virtual std::vector<StreamCounters> counters() const = 0;
   /// What the device itself says is the matter, in plain words; empty where all is well.
-  [[nodiscard]] virtual std::string trouble(int64_t now_utime) const {
+  [[nodiscard]] virtual std::string state_reason(int64_t now_utime) const {
     (void)now_utime;
     return {};
   }
@@ -85,7 +85,7 @@ class Companion {
   /// Called about every 50 ms; does not wait. `device` may be null.
   virtual void step(int64_t now_utime, const SensorDriver& driver, ByteSource* device) = 0;
   /// In plain words; empty where all is well.
-  [[nodiscard]] virtual std::string trouble() const = 0;
+  [[nodiscard]] virtual std::string state_reason() const = 0;
   /// What came from the network since the last call, for RAW_<raw_channel()>.
   [[nodiscard]] virtual std::vector<uint8_t> take_received() = 0;
   [[nodiscard]] virtual std::string raw_channel() const = 0;

@@ -26,10 +26,10 @@ class FileSource : public ByteSource {
   FileSource(const std::string& path, double bytes_per_s)
       : path_(path), file_(open_stream(path)), bytes_per_s_(bytes_per_s), due_(SteadyClock::now()) {}
 
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override {
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override {
     const auto now = SteadyClock::now();
-    if (due_ > now + patience) {
-      std::this_thread::sleep_for(patience);
+    if (due_ > now + timeout) {
+      std::this_thread::sleep_for(timeout);
       return ReadState::kNothing;
     }
     std::this_thread::sleep_until(due_);
@@ -59,11 +59,11 @@ class CandumpSource : public ByteSource {
  public:
   explicit CandumpSource(const std::string& path) : path_(path), file_(open_stream(path)), begin_(SteadyClock::now()) {}
 
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override {
-    const auto until = SteadyClock::now() + patience;
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override {
+    const auto until = SteadyClock::now() + timeout;
     if (line_.empty() && !next_line()) return ReadState::kEnd;
     if (due_ > until) {
-      std::this_thread::sleep_for(patience);
+      std::this_thread::sleep_for(timeout);
       return ReadState::kNothing;
     }
     std::this_thread::sleep_until(due_);

@@ -24,10 +24,10 @@ LiveDriver::LiveDriver(const DriverSetup& setup, Bus& bus)
   if (setup_.make_companion) companion_ = setup_.make_companion();
 }
 
-bool LiveDriver::step(std::chrono::milliseconds patience) {
+bool LiveDriver::step(std::chrono::milliseconds timeout) {
   publish_due();
   packets_.clear();
-  if (session_.step(DeviceSession::Clock::now(), patience, packets_)) {
+  if (session_.step(DeviceSession::Clock::now(), timeout, packets_)) {
     for (std::size_t i = 0; i < raw_seq_.size(); ++i) take(static_cast<int>(i), clock_.now_utime(), {});
   }
   const int64_t now = clock_.now_utime();
@@ -76,10 +76,10 @@ void LiveDriver::publish_due() {
   }
 }
 
-std::string LiveDriver::trouble() {
-  std::string text = session_.trouble(DeviceSession::Clock::now());
-  if (text.empty() && reader_.driver() != nullptr) text = reader_.driver()->trouble(clock_.now_utime());
-  if (text.empty() && companion_) text = companion_->trouble();
+std::string LiveDriver::state_reason() {
+  std::string text = session_.state_reason(DeviceSession::Clock::now());
+  if (text.empty() && reader_.driver() != nullptr) text = reader_.driver()->state_reason(clock_.now_utime());
+  if (text.empty() && companion_) text = companion_->state_reason();
   return text;
 }
 
@@ -90,9 +90,9 @@ void LiveDriver::publish_heartbeat(int64_t now_utime, bool stopping) {
   h.utime = now_utime;
   h.run = clock_.run();
   h.seq = heartbeat_seq_++;
-  h.state_reason = trouble();
+  h.state_reason = state_reason();
   unsent_.note(now_utime, bus_.unsent());
-  if (const std::string unsent = unsent_.trouble(now_utime); !unsent.empty()) {
+  if (const std::string unsent = unsent_.state_reason(now_utime); !unsent.empty()) {
     h.state_reason += (h.state_reason.empty() ? "" : "; ") + unsent;
   }
   h.state = h.state_reason.empty() ? heartbeat_t::STATE_RUNNING : heartbeat_t::STATE_DEGRADED;

@@ -4,7 +4,7 @@
 #include "bus/bus.h"
 #include "bus/run/process_facts.h"
 #include "bus/run/run_clock.h"
-#include "bus/run/unsent_watch.h"
+#include "bus/run/unsent_monitor.h"
 #include "drivers/device/device_session.h"
 #include "drivers/device/driver.h"
 
@@ -15,14 +15,14 @@ class LiveDriver {
   /// `setup` outlives it.
   LiveDriver(const DriverSetup& setup, Bus& bus);
 
-  /// Reads for up to `patience` and publishes what came. False where nothing will ever come again (a file is over).
-  bool step(std::chrono::milliseconds patience);
+  /// Reads for up to `timeout` and publishes what came. False where nothing will ever come again (a file is over).
+  bool step(std::chrono::milliseconds timeout);
 
   /// A last heartbeat.
   void stop();
 
   /// In plain words what is the matter with the device; empty where all is well.
-  [[nodiscard]] std::string trouble();
+  [[nodiscard]] std::string state_reason();
   [[nodiscard]] std::string device_name() const { return session_.name(); }
   /// How often the device was opened.
   [[nodiscard]] int64_t openings() const { return session_.openings(); }
@@ -51,7 +51,7 @@ class LiveDriver {
   Bus& bus_;
   RunClock clock_;
   ProcessLoad load_;
-  UnsentWatch unsent_;
+  UnsentMonitor unsent_;
   BusOutputs outputs_;
   RawReader reader_;
   DeviceSession session_;

@@ -50,11 +50,11 @@ void run_live(const CommandLine& arguments, const DriverSetup& setup) {
       said.clear();
     }
     openings = driver.openings();
-    const std::string trouble = driver.trouble();
-    const std::string kind = trouble.substr(0, trouble.find(';'));
+    const std::string state_reason = driver.state_reason();
+    const std::string kind = state_reason.substr(0, state_reason.find(';'));
     if (kind == said) continue;
     said = kind;
-    say(trouble.empty() ? driver.device_name() + ": bytes come" : trouble);
+    say(state_reason.empty() ? driver.device_name() + ": bytes come" : state_reason);
   }
   service.stopping();
   driver.stop();

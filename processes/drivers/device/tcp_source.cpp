@@ -59,8 +59,8 @@ int connect_to(const std::string& host, const std::string& port) {
 TcpSource::TcpSource(const std::string& host, const std::string& port)
     : DescriptorSource(connect_to(host, port), "tcp:" + host + ":" + port), heard_(std::chrono::steady_clock::now()) {}
 
-ReadState TcpSource::read(std::chrono::milliseconds patience, std::vector<Packet>& packets) {
-  const ReadState state = DescriptorSource::read(patience, packets);
+ReadState TcpSource::read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) {
+  const ReadState state = DescriptorSource::read(timeout, packets);
   const auto now = std::chrono::steady_clock::now();
   if (state == ReadState::kData) heard_ = now;
   return state == ReadState::kNothing && now - heard_ > kSilence ? ReadState::kLost : state;

@@ -11,7 +11,7 @@ class TcpSource : public DescriptorSource {
   TcpSource(const std::string& host, const std::string& port);
 
   /// A silence of ten seconds counts as lost: a peer that vanished says nothing.
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override;
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override;
 
  private:
   std::chrono::steady_clock::time_point heard_;

@@ -63,9 +63,9 @@ void ThreadedSource::read_all(const std::shared_ptr<Shared>& shared) {
   shared->changed.notify_all();
 }
 
-ReadState ThreadedSource::read(std::chrono::milliseconds patience, std::vector<Packet>& packets) {
+ReadState ThreadedSource::read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) {
   std::unique_lock lock(shared_->mutex);
-  shared_->changed.wait_for(lock, patience, [this] { return shared_->over || !shared_->waiting.empty(); });
+  shared_->changed.wait_for(lock, timeout, [this] { return shared_->over || !shared_->waiting.empty(); });
   if (shared_->waiting.empty()) return shared_->over.value_or(ReadState::kNothing);
   const int64_t now = now_(), steady = steady_us();
   for (Packet& packet : shared_->waiting) {

@@ -23,7 +23,7 @@ class ThreadedSource : public ByteSource {
   ThreadedSource(const ThreadedSource&) = delete;
   ThreadedSource& operator=(const ThreadedSource&) = delete;
 
-  ReadState read(std::chrono::milliseconds patience, std::vector<Packet>& packets) override;
+  ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override;
   [[nodiscard]] std::string name() const override { return name_; }
 
  private:

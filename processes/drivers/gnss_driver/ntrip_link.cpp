@@ -45,7 +45,7 @@ NtripLink::~NtripLink() {
 
 void NtripLink::say_trouble(const std::string& text) {
   const std::lock_guard lock(mutex_);
-  trouble_ = text;
+  state_reason_ = text;
 }
 
 void NtripLink::work() {
@@ -114,9 +114,9 @@ void NtripLink::step(int64_t now_utime, const SensorDriver& driver, ByteSource* 
 
 std::vector<uint8_t> NtripLink::take_received() { return std::exchange(received_, {}); }
 
-std::string NtripLink::trouble() const {
+std::string NtripLink::state_reason() const {
   const std::lock_guard lock(mutex_);
-  return trouble_.empty() && device_refuses_ ? "NTRIP: the receiver takes no corrections" : trouble_;
+  return state_reason_.empty() && device_refuses_ ? "NTRIP: the receiver takes no corrections" : state_reason_;
 }
 
 }  // namespace roadfix

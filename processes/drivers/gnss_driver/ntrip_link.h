@@ -19,7 +19,7 @@ class NtripLink : public Companion {
   NtripLink& operator=(const NtripLink&) = delete;
 
   void step(int64_t now_utime, const SensorDriver& driver, ByteSource* device) override;
-  [[nodiscard]] std::string trouble() const override;
+  [[nodiscard]] std::string state_reason() const override;
   [[nodiscard]] std::vector<uint8_t> take_received() override;
   [[nodiscard]] std::string raw_channel() const override { return "RAW_NTRIP"; }
 
@@ -31,7 +31,7 @@ class NtripLink : public Companion {
   NtripConfig config_;
   std::string request_;
   mutable std::mutex mutex_;
-  std::string trouble_ = "NTRIP: not connected yet";
+  std::string state_reason_ = "NTRIP: not connected yet";
   std::vector<uint8_t> corrections_;  ///< received, not yet for the device
   std::vector<uint8_t> received_;     ///< the same, not yet taken
   std::string position_;              ///< the newest, for the caster

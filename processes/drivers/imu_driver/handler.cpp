@@ -244,7 +244,7 @@ void ImuDriver::take_nav(const SbgEkfNav& nav, int64_t read_utime, SensorOutputs
   count(config_.solution_channel, outputs.publish(config_.solution_channel, pose), *utime);
 }
 
-std::string ImuDriver::trouble(int64_t now_utime) const {
+std::string ImuDriver::state_reason(int64_t now_utime) const {
   if (clipped_ == 0 || now_utime - clipped_utime_ > kTold_us) return {};
   return "the motion is beyond the IMU's range: " + std::to_string(clipped_) + " samples are clipped";
 }

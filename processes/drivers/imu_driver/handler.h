@@ -41,7 +41,7 @@ class ImuDriver : public SensorDriver {
   void take(int stream, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) override;
   [[nodiscard]] std::vector<StreamCounters> counters() const override;
   /// Motion beyond the sensor's range: such samples are published (imu_t has no place to mark them), and told here.
-  [[nodiscard]] std::string trouble(int64_t now_utime) const override;
+  [[nodiscard]] std::string state_reason(int64_t now_utime) const override;
 
  private:
   void take_imu(const SbgImuShort& imu, int64_t read_utime, SensorOutputs& outputs);

@@ -156,9 +156,9 @@ TEST_CASE("a recorded log is a bus: its order of arrival gives the same outputs 
 TEST_CASE("stamps gone back are five in order of one publisher, not strays, forged or broken ones") {
   constexpr int64_t kNow_us = 1'700'000'000'000'000, kHour_us = 3'600'000'000;
   const auto confirmed = [](const std::vector<std::pair<int, Header>>& messages) {
-    StepBack back(3);
+    BackwardStampDetector back(3);
     bool any = false;
-    for (const auto& [input, header] : messages) any = back.confirmed_by(input, header, kNow_us) || any;
+    for (const auto& [input, header] : messages) any = back.detect(input, header, kNow_us) || any;
     return any;
   };
   const auto at = [&](int i) { return Header{kNow_us - kHour_us + 10'000 * i, 7, i}; };
@@ -199,13 +199,13 @@ TEST_CASE("broken and forged clock samples do not begin a new run, whatever time
 }
 
 TEST_CASE("what the network did not take is told until some heartbeats came through") {
-  UnsentWatch watch;
+  UnsentMonitor watch;
   watch.note(1'000'000, 0);
-  REQUIRE(watch.trouble(1'000'000).empty());
+  REQUIRE(watch.state_reason(1'000'000).empty());
   watch.note(2'000'000, 7);
-  REQUIRE(watch.trouble(4'900'000) == "the network did not take 7 messages");
+  REQUIRE(watch.state_reason(4'900'000) == "the network did not take 7 messages");
   watch.note(4'900'000, 7);
-  REQUIRE(watch.trouble(5'100'000).empty());
+  REQUIRE(watch.state_reason(5'100'000).empty());
 
   for (const bool gone : {true, false}) {
     OutageBus bus;

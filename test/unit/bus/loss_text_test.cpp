@@ -13,7 +13,7 @@ std::string words(int64_t first_seq, int64_t last_seq) {
   LogLoss loss;
   loss.first_seq = first_seq;
   loss.last_seq = last_seq;
-  return loss_in_words(spec, loss);
+  return describe_loss(spec, loss);
 }
 
 constexpr int64_t kFirst = std::numeric_limits<int64_t>::min();

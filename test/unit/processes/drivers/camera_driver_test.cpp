@@ -79,8 +79,8 @@ TEST_CASE("a camera that is not plugged in, and a device that is none, are told 
     CameraDriverConfig config;
     config.devices = {device};
     Bench bench(camera_driver_setup(config));
-    REQUIRE(bench.step_until([&] { return bench.driver().trouble().find(words) != std::string::npos; }));
-    CHECK(bench.driver().trouble().starts_with(device));
+    REQUIRE(bench.step_until([&] { return bench.driver().state_reason().find(words) != std::string::npos; }));
+    CHECK(bench.driver().state_reason().starts_with(device));
     CHECK(bench.count("CAMERA_LEFT") == 0);
   }
 }

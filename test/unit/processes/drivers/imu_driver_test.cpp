@@ -56,12 +56,12 @@ TEST_CASE("motion beyond the sensor's range is used, and told for three seconds"
     const auto status = static_cast<uint16_t>(i == 4 ? 0x02FF : i == 6 ? 0x01FF : 0x03FF);  // accelerometer, gyroscope
     reads.push_back({kStart + 5000 * i, test::sbg_imu_bytes(5000U * i, status)});
   }
-  CHECK(driver.trouble(kStart).empty());
+  CHECK(driver.state_reason(kStart).empty());
   CHECK(test::run_driver_over(driver, {reads[0], reads[1]}).sent.size() == 2);
-  CHECK(driver.trouble(kStart + 10'000).empty());
+  CHECK(driver.state_reason(kStart + 10'000).empty());
   CHECK(test::run_driver_over(driver, {reads.begin() + 2, reads.end()}).sent.size() == 8);
-  CHECK(driver.trouble(kStart + 1'000'000) == "the motion is beyond the IMU's range: 2 samples are clipped");
-  CHECK(driver.trouble(kStart + 4'000'000).empty());
+  CHECK(driver.state_reason(kStart + 1'000'000) == "the motion is beyond the IMU's range: 2 samples are clipped");
+  CHECK(driver.state_reason(kStart + 4'000'000).empty());
 }
 
 TEST_CASE("GPS1_POS, GPS1_VEL and GPS1_HDT of one moment make one fix") {

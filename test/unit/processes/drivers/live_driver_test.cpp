@@ -107,7 +107,7 @@ TEST_CASE("unplugged and plugged in again: said in the heartbeat, opened again w
   ImuDriverConfig config;
   config.device = quick(link);
   Bench bench(imu_driver_setup(config));
-  REQUIRE(bench.step_until([&] { return bench.driver().trouble().find("No such file") != std::string::npos; }));
+  REQUIRE(bench.step_until([&] { return bench.driver().state_reason().find("No such file") != std::string::npos; }));
   uint32_t t_us = 0;
   for (int round = 0; round < 3; ++round) {
     {
@@ -120,10 +120,10 @@ TEST_CASE("unplugged and plugged in again: said in the heartbeat, opened again w
         pty.write(imu_frame(t_us += 5000));
         return bench.count("IMU") > samples + 3;
       }));
-      CHECK(bench.driver().trouble().empty());
+      CHECK(bench.driver().state_reason().empty());
     }
     std::filesystem::remove(link);
-    REQUIRE(bench.step_until([&] { return !bench.driver().trouble().empty(); }));
+    REQUIRE(bench.step_until([&] { return !bench.driver().state_reason().empty(); }));
   }
   bench.driver().stop();
   REQUIRE(bench.step_until([&] { return bench.heartbeat().state == heartbeat_t::STATE_STOPPING; }));
@@ -137,7 +137,7 @@ TEST_CASE("a device that says nothing is a trouble") {
   config.device = quick(pty.name());
   config.device.silence = 0.05;
   Bench bench(imu_driver_setup(config));
-  REQUIRE(bench.step_until([&] { return bench.driver().trouble().find("no byte for") != std::string::npos; }));
+  REQUIRE(bench.step_until([&] { return bench.driver().state_reason().find("no byte for") != std::string::npos; }));
 }
 
 TEST_CASE("the pauses between attempts grow to their limit, and begin anew after bytes") {
@@ -228,13 +228,13 @@ TEST_CASE("SocketCAN: the kernel's frames become wheel speeds, and an interface 
   REQUIRE(bench.step_until([&] { return bench.count("WHEELS") == 1; }));
   wire.send(fast);
   REQUIRE(bench.step_until([&] { return bench.count("WHEELS") == 2; }));
-  CHECK(bench.driver().trouble().empty());
+  CHECK(bench.driver().state_reason().empty());
   const std::vector<Published> live = sensor_messages(bench);
   CHECK(decode<wheels_t>(live[0].bytes).speed_mps[0] == Approx(10.0));
   CHECK(decode<wheels_t>(live[1].bytes).speed_mps[0] == Approx(20.0));
   CHECK(replayed(bench) == live);
   wire.unplug();
-  REQUIRE(bench.step_until([&] { return bench.driver().trouble().find("Network is down; tried again") == 10; }));
+  REQUIRE(bench.step_until([&] { return bench.driver().state_reason().find("Network is down; tried again") == 10; }));
 }
 
 TEST_CASE("SocketCAN: an interface that is not there is said") {
@@ -341,7 +341,7 @@ TEST_CASE("NTRIP: corrections go to the receiver, its position to the caster") {
     Bytes got;
     REQUIRE(bench.step_until([&] {
       test::append(got, receiver.read());
-      return got.size() >= corrections.size() && bench.count("RAW_NTRIP") > 0 && bench.driver().trouble().empty();
+      return got.size() >= corrections.size() && bench.count("RAW_NTRIP") > 0 && bench.driver().state_reason().empty();
     }));
     CHECK(got == corrections);
     REQUIRE(bench.step_until([&] { return caster.heard().find("$GPGGA,") != std::string::npos; }));

@@ -27,9 +27,9 @@ struct Made {
   int gone = 0;  ///< sources that were closed
 
   template <class Done>
-  bool wait(const Done& done, milliseconds patience = milliseconds(60'000)) {
+  bool wait(const Done& done, milliseconds timeout = milliseconds(60'000)) {
     std::unique_lock lock(mutex);
-    return changed.wait_for(lock, patience, done);
+    return changed.wait_for(lock, timeout, done);
   }
   void set(bool& what, bool to) {
     const std::lock_guard lock(mutex);
@@ -156,7 +156,7 @@ TEST_CASE("a camera that hangs: the driver's heart beats, says so, and the pictu
   const std::size_t pictures = bench.count("CAMERA_LEFT");
   made->set(made->hangs, false);
   REQUIRE(bench.step_until([&] { return bench.count("CAMERA_LEFT") > pictures + 5; }));
-  CHECK(bench.driver().trouble().empty());
+  CHECK(bench.driver().state_reason().empty());
 }
 
 }  // namespace

@@ -166,7 +166,7 @@ TEST_CASE("pose server: no position of a pose that has none") {
   CHECK(Server::fields(text, "RMC").at(2) == "V");
   CHECK(Server::fields(text, "HDT").at(1).empty());
   CHECK(text.find("4800") == std::string::npos);
-  CHECK_FALSE(server.handler.trouble().empty());
+  CHECK_FALSE(server.handler.state_reason().empty());
 }
 
 TEST_CASE("pose server: heights are above sea level, or not there") {
@@ -226,10 +226,10 @@ TEST_CASE("pose server: silence is told, and no old pose comes again") {
   const std::string text = server.handler.advance(kStart_us + 600'000);
   CHECK(Server::fields(text, "GGA").at(6) == "0");
   CHECK(Server::fields(text, "RMC").at(2) == "V");
-  CHECK(server.handler.trouble() == "POSE_FUSED is silent for 0.6 s");
+  CHECK(server.handler.state_reason() == "POSE_FUSED is silent for 0.6 s");
   CHECK(server.handler.advance(kStart_us + 600'000).empty());  // at its rate, too
   CHECK(server.quality(pose_at(kStart_us + 800'000)) == "6");
-  CHECK(server.handler.trouble().empty());
+  CHECK(server.handler.state_reason().empty());
 }
 
 TEST_CASE("pose server: a drive played again begins again") {

@@ -127,7 +127,7 @@ TEST_CASE("outlets: a pseudo-terminal gives the present to who opens it late") {
   CHECK(got.find(sentence(last - 1'000)) == std::string::npos);  // ten seconds old
   CHECK(got.find(sentence(last + 50)) != std::string::npos);
   CHECK(got.ends_with(sentence(last + 99)));
-  CHECK(outlet->trouble().empty());
+  CHECK(outlet->state_reason().empty());
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-/// What the network did not take, in words for the heartbeat: of the messages that other processes never got, this is
-/// the only trace.
+/// Counts messages that the network did not take, and gives the reason for the heartbeat: of what other processes never
+/// got, this is the only trace.
 #pragma once
 
 #include <cstdint>
@@ -7,21 +7,21 @@
 
 namespace roadfix {
 
-class UnsentWatch {
+class UnsentMonitor {
  public:
   /// `unsent`: the bus's count (Bus::unsent()).
   void note(int64_t now_utime, int64_t unsent) {
     if (unsent <= unsent_) return;
     unsent_ = unsent;
-    until_us_ = now_utime + kTold_us;
+    until_us_ = now_utime + kReported_us;
   }
   /// Empty where all was sent, and once some heartbeats have come through again.
-  [[nodiscard]] std::string trouble(int64_t now_utime) const {
+  [[nodiscard]] std::string state_reason(int64_t now_utime) const {
     return now_utime < until_us_ ? "the network did not take " + std::to_string(unsent_) + " messages" : std::string();
   }
 
  private:
-  static constexpr int64_t kTold_us = 3'000'000;
+  static constexpr int64_t kReported_us = 3'000'000;
 
   int64_t unsent_ = 0;
   int64_t until_us_ = 0;
