@@ -1,6 +1,7 @@
 #include "navigation/filter.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/so3.h"
 
@@ -120,7 +121,7 @@ void Filter::flush() {
     step.Q = (move * step.Q * move.transpose()).eval();
     state_.p_ref = state_.x.nav.position;
   }
-  steps_.move(step.F, diagonal(T).decay);
+  steps_.move(state_, step.F, diagonal(T).decay);
   const int n = state_.size();
   Eigen::MatrixXd& P = state_.P();
   Eigen::Matrix<double, 9, Eigen::Dynamic, 0, 9, kMaxSize> rows(9, n);
@@ -190,7 +191,7 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
     for (int k = 0; k < i; ++k) Y.col(i) -= innovation.L(i, k) * Y.col(k);
     Y.col(i) /= innovation.L(i, i);
   }
-  steps_.use<Rows>(m.H, innovation.L, innovation.whitened, Y, evidence);
+  steps_.use<Rows>(state_, m.H, innovation.L, innovation.whitened, Y, evidence);
   Eigen::VectorXd& d = scratch_;
   d.head(n) = Y.lazyProduct(innovation.whitened);
   if (considered_size_ == 0) {
@@ -218,18 +219,17 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
 std::optional<StepDetector::Step> Filter::mend_step(double sigmas) {
   const std::optional<StepDetector::Step> step = steps_.most_likely(sigmas);
   if (!step) {
-    steps_.advance(state_.x.t_us);
+    steps_.advance(state_);
     return std::nullopt;
   }
   flush();
-  scratch_.setZero();
-  scratch_.head<kWithoutCamera>() = step->size * step->per_unit;
+  const int n = state_.size();
+  const auto per_unit = state_.carried().col(step->column).head(n);
+  scratch_.head(n) = step->size * per_unit;
   state_.retract(scratch_);
-  state_.P().topLeftCorner<kWithoutCamera, kWithoutCamera>() +=
-      (step->variance * step->per_unit * step->per_unit.transpose()).eval();
-  for (int j = 1; j < kWithoutCamera; ++j)
-    for (int i = 0; i < j; ++i) state_.P()(i, j) = state_.P()(j, i);
-  steps_.begin();
+  scratch_.head(n) = std::sqrt(step->variance) * per_unit;
+  for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += scratch_(j) * scratch_.head(n);
+  steps_.begin(state_);
   return step;
 }
 

@@ -60,7 +60,7 @@ class Filter {
   void widen(const BaseVector& d);
 
   /// Watches for steps from now on, (N.5.8).
-  void watch_for_steps() { steps_.begin(); }
+  void watch_for_steps() { steps_.begin(state_); }
   [[nodiscard]] StepDetector& steps() { return steps_; }
   /// A step that explains the innovations better than chance does at this many sigmas is taken back.
   std::optional<StepDetector::Step> mend_step(double sigmas);

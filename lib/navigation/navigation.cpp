@@ -254,10 +254,7 @@ void Navigation::use_pictures(int64_t t_us) {
   while (camera_->next_us(filter.state().x).value_or(INT64_MAX) <= t_us) {
     const bool standing = aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen());
     const std::optional<AidingRecord> record = camera_->use(filter, standing);
-    if (!record) continue;
-    note(*record);
-    // The detector carries no columns of poses, so what it has carried ends with an update by them.
-    if (record->status == AidingStatus::kAccepted && filter.steps().watches()) filter.steps().begin();
+    if (record) note(*record);
   }
 }
 

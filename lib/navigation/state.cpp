@@ -86,7 +86,8 @@ State::State(bool camera)
     : base_(camera ? kBaseSize : kWithoutCamera),
       size_(base_),
       P_(Eigen::MatrixXd::Zero(camera ? kMaxSize : kWithoutCamera, camera ? kMaxSize : kWithoutCamera)),
-      expected_(Eigen::VectorXd::Zero(P_.rows())) {
+      expected_(Eigen::VectorXd::Zero(P_.rows())),
+      carried_(P_.rows(), 0) {
   if (!camera) return;
   clones.reserve(kMaxClones);
   points.reserve(kMaxPoints);
@@ -107,6 +108,7 @@ void State::reset(const Mean& mean, const BaseVector& variance) {
   P_.setZero();
   P_.diagonal().head(base_) = variance.head(base_);
   expected_.setZero();
+  carried_.setZero();
   held_ = false;
 }
 
@@ -181,6 +183,7 @@ void State::move_reference(const Eigen::Vector3d& p) {
     P_.block(pos, 0, 3, size_) -= D * P_.block(att, 0, 3, size_).eval();
     P_.block(0, pos, size_, 3) -= P_.block(0, att, size_, 3).eval() * D.transpose();
     if (held_) expected_.segment<3>(pos) -= D * expected_.segment<3>(att);
+    carried_.middleRows(pos, 3) -= D.lazyProduct(carried_.middleRows(att, 3));
   };
   move(kAtt, kPos);
   for (const Clone& c : clones) move(c.at, c.at + 3);
@@ -193,6 +196,7 @@ int State::grow(int width) {
   P_.block(at, 0, width, size_).setZero();
   P_.block(0, at, size_, width).setZero();
   expected_.segment(at, width).setZero();
+  carried_.middleRows(at, width).setZero();
   return at;
 }
 
@@ -204,6 +208,7 @@ void State::erase(int at, int width) {
     std::memmove(column + at, column + at + width, static_cast<size_t>(behind) * sizeof(double));
   }
   for (int j = at; j < at + behind; ++j) expected_(j) = expected_(j + width);
+  for (int j = at; j < at + behind; ++j) carried_.row(j) = carried_.row(j + width);
   size_ -= width;
   const auto moved = [&](int& a) { a = a > at ? a - width : a; };
   for (Clone& c : clones) moved(c.at);
@@ -247,6 +252,9 @@ void State::add_clone(int64_t id, const Eigen::Vector3d& rate, double jitter) {
     expected_.segment<3>(at + 3) = expected_.segment<3>(kPos);
     expected_.segment<6>(at) += J_time * expected_(kCameraOffset);
   }
+  carried_.middleRows<3>(at) = carried_.middleRows<3>(kAtt);
+  carried_.middleRows<3>(at + 3) = carried_.middleRows<3>(kPos);
+  carried_.middleRows<6>(at) += J_time * carried_.row(kCameraOffset);
   clones.push_back({id, x.t_us, at, x.R(), x.nav.position});
 }
 

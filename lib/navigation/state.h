@@ -145,6 +145,12 @@ class State {
   [[nodiscard]] const Eigen::VectorXd& expected() const { return expected_; }
   [[nodiscard]] Eigen::VectorXd& expected() { return expected_; }
 
+  /// Columns of errors that go along with every change of coordinates as the covariance's rows do, the leading size()
+  /// rows of them; carry() makes them anew, zero.
+  void carry(int columns) { carried_ = Eigen::MatrixXd::Zero(P_.rows(), columns); }
+  [[nodiscard]] const Eigen::MatrixXd& carried() const { return carried_; }
+  [[nodiscard]] Eigen::MatrixXd& carried() { return carried_; }
+
   /// P -= Y Y', Y with size() rows, symmetric to the bit.
   void subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y);
   /// Expresses all errors about p, (N.1.5).
@@ -169,6 +175,7 @@ class State {
   int size_;
   Eigen::MatrixXd P_;
   Eigen::VectorXd expected_;
+  Eigen::MatrixXd carried_;
   bool held_ = false;
 };
 
@@ -188,6 +195,12 @@ void State::serialise(Archive& a) {
     a(expected_(j));
     for (int i = 0; i < size_; ++i) a(P_(i, j));
   }
+  auto columns = static_cast<int64_t>(carried_.cols());
+  a(columns);
+  if (columns < 0 || columns > kMaxSize) throw std::runtime_error("state: impossible number of carried columns");
+  if (columns != carried_.cols()) carry(static_cast<int>(columns));
+  for (int j = 0; j < carried_.cols(); ++j)
+    for (int i = 0; i < size_; ++i) a(carried_(i, j));
 }
 
 }  // namespace roadfix::navigation

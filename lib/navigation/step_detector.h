@@ -2,7 +2,8 @@
 /// may step: for some moments it carries what a step of one unit then would have made of the filter's errors since, and
 /// how well that explains the innovations, (N.5.8) to (N.5.10) of MODEL.md.
 ///
-/// Knows the base block alone; measurements with other columns end what is carried: begin() again after them.
+/// What a step would have made of the errors are the columns that the state carries (State::carried()), so poses of the
+/// camera have their rows too.
 #pragma once
 
 #include <array>
@@ -21,28 +22,31 @@ class StepDetector {
   static constexpr int kColumns = kHypotheses * kMoments;
 
   struct Step {
-    int state = 0;                                      ///< which stepped
-    double size = 0.0, variance = 0.0;                  ///< in the state's unit
-    Eigen::Matrix<double, kWithoutCamera, 1> per_unit;  ///< errors of the filter now per unit of the step
+    int state = 0;                      ///< which stepped
+    double size = 0.0, variance = 0.0;  ///< in the state's unit
+    int column = 0;                     ///< carried column: errors of the filter now per unit of the step
   };
 
   /// Watches from now on.
-  void begin();
+  void begin(State& state);
   void stop() { watches_ = false; }
   [[nodiscard]] bool watches() const { return watches_; }
   /// At t_us, often: the oldest of the recent moments are replaced by now.
-  void advance(int64_t t_us);
+  void advance(State& state);
 
   /// The filter's covariance step.
-  void move(const Eigen::Matrix<double, 9, kInertialSize>& F, const Eigen::Matrix<double, kWithoutCamera, 1>& decay);
+  void move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
+            const Eigen::Matrix<double, kWithoutCamera, 1>& decay);
   /// The filter's update: `whitened` innovation u = L^-1 r, Y = P H' L^-T; `counts`: it is evidence.
   template <int Rows>
-  void use(const Eigen::Matrix<double, Rows, kWithoutCamera>& H, const Eigen::Matrix<double, Rows, Rows>& L,
-           const Eigen::Matrix<double, Rows, 1>& whitened, const Eigen::Ref<const Eigen::MatrixXd>& Y, bool counts) {
+  void use(State& state, const Eigen::Matrix<double, Rows, kWithoutCamera>& H,
+           const Eigen::Matrix<double, Rows, Rows>& L, const Eigen::Matrix<double, Rows, 1>& whitened,
+           const Eigen::Ref<const Eigen::MatrixXd>& Y, bool counts) {
     if (!watches_) return;
-    Eigen::Matrix<double, Rows, kColumns> G = H.lazyProduct(per_unit_);
+    auto errors = state.carried().topRows(state.size());
+    Eigen::Matrix<double, Rows, kColumns> G = H.lazyProduct(errors.template topRows<kWithoutCamera>());
     L.template triangularView<Eigen::Lower>().solveInPlace(G);
-    per_unit_.noalias() -= Y.topRows<kWithoutCamera>().lazyProduct(G);
+    errors.noalias() -= Y.lazyProduct(G);
     if (!counts) return;
     const double squares = whitened.squaredNorm();
     usual_ += kUsualGain * (std::min(squares / Rows, kMostSquare) - usual_);
@@ -58,19 +62,18 @@ class StepDetector {
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(watches_, next_us_, turn_, usual_, per_unit_, information_, sum_, squares_);
+    a(watches_, next_us_, turn_, usual_, information_, sum_, squares_);
   }
 
  private:
   static constexpr double kUsualGain = 0.01;  // ten seconds of wheel speeds
   static constexpr double kMostSquare = 9.0;  // one innovation counts at most as three sigma
-  void begin(int column);
+  void begin(State& state, int column);
 
   bool watches_ = false;
   int64_t next_us_ = 0;
   int turn_ = 0;
   double usual_ = 1.0;  ///< mean normalised square: measurements may be noisier than they claim
-  Eigen::Matrix<double, kWithoutCamera, kColumns> per_unit_;
   Eigen::Matrix<double, kColumns, 1> information_, sum_, squares_;
 };
 

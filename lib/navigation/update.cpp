@@ -104,6 +104,13 @@ bool Update::apply(State& state) {
   auto r = r_.head(rows_);
   llt.matrixL().solveInPlace(r);
   d_.head(size_).noalias() = PHt * r;
+  if (const auto columns = state.carried().cols(); columns > 0) {
+    auto carried = state.carried().topRows(size_);
+    G_.resize(rows_, columns);
+    G_.noalias() = H * carried;
+    llt.matrixL().solveInPlace(G_);
+    carried.noalias() -= PHt * G_;
+  }
   state.subtract(PHt);
   state.correct(d_);
   return true;

@@ -102,7 +102,7 @@ class Update {
 
  private:
   int rows_ = 0, size_ = 0;
-  Eigen::MatrixXd H_, PHt_, S_;
+  Eigen::MatrixXd H_, PHt_, S_, G_;
   Eigen::VectorXd r_, d_;
 };
 

@@ -1,5 +1,6 @@
 #include "gnss_ins_ekf/navigation_messages.h"
 
+#include <array>
 #include <cmath>
 
 #include "bus/sample_codec.h"
@@ -40,6 +41,13 @@ void fill_estimates(const navigation::Filter& filter, const navigation::VehicleF
   m.wheel_latency_s = x.wheel_latency;
   m.wheel_latency_std_s = std_of(P, kWheelLatency);
 }
+
+/// The values of AidingSource in aiding_t's words; those of the first eight, and the bits of aided_by, are the same.
+constexpr std::array<int8_t, navigation::kAidingSources> kSources = {
+    aiding_t::SOURCE_GNSS_POSITION, aiding_t::SOURCE_GNSS_VELOCITY, aiding_t::SOURCE_GNSS_HEADING,
+    aiding_t::SOURCE_WHEEL_SPEED,   aiding_t::SOURCE_NO_SIDESLIP,   aiding_t::SOURCE_ZERO_VELOCITY,
+    aiding_t::SOURCE_ZERO_RATE,     aiding_t::SOURCE_MAG_HEADING,   aiding_t::SOURCE_WHEEL_YAW_RATE,
+    aiding_t::SOURCE_CAMERA_TRACKS, aiding_t::SOURCE_PRIOR_POSE};
 
 int8_t pose_state(const navigation::NavigationOutput& output) {
   if (output.odometry.validity == Validity::kValid) return pose_t::STATE_RUNNING;
@@ -91,7 +99,7 @@ aiding_t aiding(const navigation::AidingRecord& record) {
   aiding_t m{};
   m.measurement_utime = record.t_us;
   m.measurement_seq = record.id;
-  m.source = static_cast<int8_t>(record.source);
+  m.source = kSources[static_cast<size_t>(record.source)];
   m.status = static_cast<int8_t>(record.status);
   m.nis = record.nis;
   m.dof = record.dof;

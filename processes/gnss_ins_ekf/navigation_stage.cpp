@@ -3,11 +3,14 @@
 #include <roadfix/imu_t.hpp>
 #include <roadfix/mag_t.hpp>
 #include <roadfix/state_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
 #include "bus/run/publish_slot.h"
 #include "bus/sample_codec.h"
+#include "bus/track_codec.h"
 #include "bus/types/message.h"
+#include "config/camera_lens.h"
 #include "config/config.h"
 #include "geometry/frames.h"
 #include "gnss_ins_ekf/handler.h"
@@ -29,7 +32,11 @@ constexpr double kUnknownOffset = 0.05;
 // s, likewise of wheel speeds: a control unit filters them and sends them every 10 to 20 ms.
 constexpr double kUnknownWheelLatency = 0.03;
 
-enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
+// s, likewise of a camera's stamps against the IMU's: kernels stamp pictures when they arrive.
+constexpr double kUnknownCameraOffset = 0.03;
+constexpr int64_t kTracksLateness_us = 200'000;  // exposure, transport, tracking
+
+enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4, kTracks = 5 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
 class NavigationStage final : public Stage {
@@ -51,7 +58,9 @@ class NavigationStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
-    spec_.state_layout = 15;
+    if (filter_config_.sources.camera && filter_config_.facts.camera)
+      spec_.inputs.push_back({"VO_FEATURES", "vo_features2_t", kTracksLateness_us, 0});
+    spec_.state_layout = 16;
     spec_.clocks = {{kImu, 200'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
@@ -71,6 +80,9 @@ class NavigationStage final : public Stage {
         break;
       case kWheels:
         filter_->add(wheel_sample(decode<wheels_t>(m.bytes)), m.seq);
+        break;
+      case kTracks:
+        filter_->add(track_picture(decode<vo_features2_t>(m.bytes)), m.seq);
         break;
       default:
         filter_->add(mag_sample(decode<mag_t>(m.bytes)), m.seq);
@@ -166,8 +178,29 @@ class NavigationStage final : public Stage {
 
 }  // namespace
 
+std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibration) {
+  const SensorsCalibration& sensors = calibration.sensors;
+  if (!sensors.camera_left || !sensors.camera_left->intrinsics_px || !sensors.camera_left->mounting) return {};
+  const CameraCalibration& left = *sensors.camera_left;
+  navigation::CameraFacts c;
+  c.left = camera_intrinsics(left, "camera_left");
+  c.T_imu_camera = T_body_camera(left, "camera_left");
+  take_known(left.mounting->std, c.place_std);
+  if (left.mounting->std_deg) c.turn_std = *left.mounting->std_deg * kDegree;
+  take_known(left.time_offset, c.offset);
+  c.offset_std = left.time_offset_std.value_or(kUnknownCameraOffset);
+  take_known(left.stamp_jitter, c.stamp_jitter);
+  take_known(left.rate, c.rate);
+  if (sensors.camera_right) {
+    c.right = camera_intrinsics(*sensors.camera_right, "camera_right");
+    c.T_left_right = c.T_imu_camera.inverse() * T_body_camera(*sensors.camera_right, "camera_right");
+  }
+  return c;
+}
+
 navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
   navigation::VehicleFacts v;
+  v.camera = camera_facts(calibration);
   v.position_latency_std = v.velocity_latency_std = kUnknownLatency;
   if (const auto& imu = calibration.sensors.imu) {
     take_known(imu->gyro_noise, v.imu.gyro);

@@ -13,6 +13,8 @@ namespace roadfix {
 struct GnssInsProcessConfig;
 
 /// What a calibration says about the sensors; what it leaves open keeps the defaults.
+/// Nothing without a left camera whose lens and mounting are known.
+std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibration);
 navigation::VehicleFacts vehicle_facts(const Calibration& calibration);
 
 std::unique_ptr<Stage> make_navigation_stage(const Calibration& calibration, const GnssInsProcessConfig& config);

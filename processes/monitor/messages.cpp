@@ -12,9 +12,10 @@ namespace roadfix {
 
 namespace {
 
-constexpr std::array<const char*, 11> kSources = {"GNSS position", "GNSS velocity",  "GNSS heading", "Wheel speed",
+constexpr std::array<const char*, 14> kSources = {"GNSS position", "GNSS velocity",  "GNSS heading", "Wheel speed",
                                                   "No sideslip",   "Standing still", "No rotation",  "Magnetic heading",
-                                                  "POSE_INS",      "POSE_VO",        "POSE_WHEEL"};
+                                                  "POSE_INS",      "POSE_VO",        "POSE_WHEEL",   "Wheel yaw rate",
+                                                  "Camera tracks", "Prior pose"};
 
 using Row = std::pair<const char*, const char*>;
 /// The first prefix that fits.

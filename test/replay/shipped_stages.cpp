@@ -6,8 +6,10 @@
 #include "config/config.h"
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"
+#include "simulation/scenarios.h"
 #include "support/picture_drive.h"
 #include "support/shared_data.h"
+#include "support/track_messages.h"
 #include "vo_tracker/handler.h"
 #include "wheel_odometry/handler.h"
 
@@ -15,6 +17,7 @@ namespace roadfix::test {
 namespace {
 
 constexpr double kDemo_s = 20.0;
+constexpr size_t kFewTracks = 60;  // a picture: enough for the filter
 
 Calibration demo_calibration() { return load_calibration(source_path("configs/demo")); }
 
@@ -46,6 +49,22 @@ const std::vector<DriveMessage>& demo() {
     return all;
   }();
   return kDemo;
+}
+
+/// The same drive once more, with tracks in place of its pictures.
+const std::vector<DriveMessage>& demo_with_tracks() {
+  static const std::vector<DriveMessage> kDemo = [] {
+    ScenarioConfig config = scenario("demo");
+    config.duration_s = kDemo_s;
+    return track_messages(make_track_drive(config, 1, with_noise_of_pictures({})), kFewTracks);
+  }();
+  return kDemo;
+}
+
+std::unique_ptr<Stage> make_navigation(const Calibration& calibration) {
+  GnssInsProcessConfig config;
+  config.filter = InsFilter::kNavigation;
+  return make_gnss_ins_ekf(calibration, config);
 }
 
 std::vector<DriveMessage> outputs(std::unique_ptr<Stage> stage, const std::vector<DriveMessage>& drive) {
@@ -91,6 +110,7 @@ const std::vector<ShippedStage>& shipped_stages() {
        picture_drive},
       {"vo_tracker, mode msckf", picture_car(false),
        [](const Calibration& c) { return make_tracker(c, VoMode::kMsckf); }, picture_drive},
+      {"gnss_ins_ekf, navigation filter with tracks", demo_calibration(), make_navigation, demo_with_tracks},
   };
   return kStages;
 }

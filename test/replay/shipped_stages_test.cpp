@@ -85,6 +85,10 @@ TEST_CASE("200 orders of arrival within the lateness, half of them with duplicat
   require_orders_alike(shipped_stages()[4]);
 }
 
+TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: the navigation filter does") {
+  require_orders_alike(shipped_stages()[5]);
+}
+
 TEST_CASE("four stages beside each other in threads: the same bytes as alone") {
   for (const ShippedStage& stage : shipped_stages()) {
     CAPTURE(stage.title);

@@ -124,7 +124,7 @@ void drive(const Options& o, uint64_t seed) {
   const int64_t start = d.drive.imu.front().t_us;
   const auto [begin, end] = outage(d.drive);
   std::vector<Sample> samples;
-  double used = 0.0, refused = 0.0, misfit = 0.0;
+  double used = 0.0, refused = 0.0, misfit = 0.0, updates = 0.0;
   int64_t next = start;
   double fit_s = 0.0;
   for (const test::DriveEvent& e : d.events) {
@@ -139,7 +139,8 @@ void drive(const Options& o, uint64_t seed) {
       if (r.source != navigation::AidingSource::kCameraTracks) continue;
       used += filter.camera()->counts().used;
       refused += filter.camera()->counts().refused;
-      misfit += filter.camera()->counts().misfit_sum;
+      misfit += filter.camera()->misfit();
+      ++updates;
     }
     filter.clear_records();
     if (imu->t_us < next) continue;
@@ -173,7 +174,7 @@ void drive(const Options& o, uint64_t seed) {
       "%d}\n",
       static_cast<int>(seed), at_end, std::sqrt(last / std::max(1, count_last)), way,
       std::sqrt(all / std::max(1, count)), ended.nees_place, ended.nees_yaw, ended.nees_velocity, fit_s, used, refused,
-      misfit / std::max(1.0, used + refused), filter.output().reset_counter);
+      misfit / std::max(1.0, updates), filter.output().reset_counter);
   std::fflush(stdout);
 }
 

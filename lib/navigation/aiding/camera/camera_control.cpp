@@ -75,8 +75,13 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
   judge(dt_s);
   const TrackCounts& counts = update_.counts();
   AidingRecord record = record_of(AidingSource::kCameraTracks, AidingStatus::kGated, now.picture.t_us, now.id);
-  record.nis = counts.nis_sum;
-  record.dof = counts.dof_sum;
+  // Hundreds of rows are reported as one: their mean square.
+  if (counts.dof_sum > 0) {
+    record.nis = counts.nis_sum / counts.dof_sum;
+    record.dof = 1;
+    record.innovation[0] = std::sqrt(record.nis);
+    record.innovation_variance[0] = 1.0;
+  }
   if (fitness_ == CameraFitness::kFit && counts.used > 0) {
     rows_.begin(state);
     rows_.add(update_.rows(), Columns(state));
@@ -109,6 +114,7 @@ void CameraControl::add_pose(Filter& filter, int64_t t_us) {
   P.block(0, at, n, 3) += dt * P.block(0, kVel, n, 3);
   P.block<3, 3>(at, at) = (0.5 * (P.block<3, 3>(at, at) + P.block<3, 3>(at, at).transpose())).eval();
   if (state.held()) state.expected().segment<3>(at) += dt * state.expected().segment<3>(kVel);
+  state.carried().middleRows<3>(at) += dt * state.carried().middleRows<3>(kVel);
 }
 
 void CameraControl::try_tracks(const State& state, bool full) {
@@ -159,7 +165,7 @@ void CameraControl::judge(double dt_s) {
   const TrackCounts& counts = update_.counts();
   if (counts.tried() < kEnoughTracks) return;
   const double step = std::min(dt_s, kShortestStep);
-  const double misfit = counts.misfit_sum / counts.tried();
+  const double misfit = update_.misfit();
   const double share = 1.0 - std::exp(-step / tuning_.judged_over);
   misfit_ += share * (misfit - misfit_);
   switch (fitness_) {

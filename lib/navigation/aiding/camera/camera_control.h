@@ -41,6 +41,8 @@ class CameraControl {
   [[nodiscard]] CameraFitness fitness() const { return fitness_; }
   /// Tracks in the newest picture that was used.
   [[nodiscard]] int num_seen() const { return num_seen_; }
+  /// Fading mean of the pictures' misfit, (N.6.14).
+  [[nodiscard]] double misfit() const { return misfit_; }
   /// Of the newest update.
   [[nodiscard]] const TrackCounts& counts() const { return update_.counts(); }
 
@@ -82,7 +84,7 @@ class CameraControl {
   TrackPicture last_;
   int64_t next_pose_ = 1, pose_us_ = 0;
   CameraFitness fitness_ = CameraFitness::kOnTrial;
-  double misfit_ = 0.0, trial_ = 0.0;  ///< fading mean of a track's misfit, and s of trial that spoke for the camera
+  double misfit_ = 0.0, trial_ = 0.0;  ///< fading mean of pictures' misfit, and s of trial that spoke for the camera
   int num_seen_ = 0;
 };
 

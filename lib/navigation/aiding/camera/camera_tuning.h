@@ -9,8 +9,8 @@ struct CameraTuning {
   int poses = 12;               ///< of the window
   double pose_interval = 0.07;  ///< s between two of them, at least
   int tracks_per_update = 40;   ///< finished tracks used at one time, longest first
-  double unfit_above = 4.0;     ///< mean misfit of tracks (nis over degrees of freedom) that no good camera has
-  double fit_below = 2.5;       ///< likewise, that a good one has
+  double unfit_above = 3.0;     ///< mean misfit of pictures, (N.6.14), that no good camera has
+  double fit_below = 1.5;       ///< likewise, that a good one has
   double judged_over = 1.0;     ///< s, memory of that mean
   double trial = 1.0;           ///< s of pictures that must fit before the camera is used, the first time
   double trial_again = 5.0;     ///< s, after it was found unfit

@@ -11,11 +11,14 @@ TrackUpdate::TrackUpdate(const TrackTuning& tuning)
       work_(kMaxTrackRows, kTrackWidth),
       stack_(kStackRows, TrackColumns::kMost + 1),
       HP_(kMaxTrackRows, TrackColumns::kMost),
-      S_(kMaxTrackRows, kMaxTrackRows) {}
+      S_(kMaxTrackRows, kMaxTrackRows) {
+  misfits_.reserve(kMostMisfits);
+}
 
 void TrackUpdate::begin(const TrackWindow& window) {
   window_ = &window;
   counts_ = {};
+  misfits_.clear();
   stacked_ = 0;
 }
 
@@ -59,7 +62,7 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
   eliminate_columns(work.topRows(rows), 3);
   const int dof = rows - 3;
   const double squared = nis(3, dof);
-  counts_.misfit_sum += std::min(squared / dof, tuning_.refuse);
+  misfits_.push_back(std::min(squared / dof, tuning_.refuse));
   if (!(squared <= tuning_.refuse * dof)) {
     ++counts_.refused;
     return false;
@@ -71,6 +74,13 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
   work.block(3, 3, dof, n + 1) *= std::sqrt(weight);
   push(work.block(3, 3, dof, n + 1));
   return true;
+}
+
+double TrackUpdate::misfit() {
+  if (misfits_.empty()) return 0.0;
+  const auto quartile = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 4);
+  std::nth_element(misfits_.begin(), quartile, misfits_.end());
+  return *quartile;
 }
 
 void TrackUpdate::push(const Eigen::Ref<const Eigen::MatrixXd>& rows) {

@@ -12,10 +12,9 @@ namespace roadfix::navigation {
 struct TrackCounts {
   int used = 0;
   int refused = 0;
-  int not_placed = 0;       ///< no triangulation
-  double nis_sum = 0.0;     ///< of used tracks, before their weight
-  int dof_sum = 0;          ///< likewise
-  double misfit_sum = 0.0;  ///< of tracks tried: nis over degrees of freedom, that of a refused one as it is refused by
+  int not_placed = 0;    ///< no triangulation
+  double nis_sum = 0.0;  ///< of used tracks, before their weight
+  int dof_sum = 0;       ///< likewise
 
   [[nodiscard]] int tried() const { return used + refused; }
 };
@@ -43,9 +42,12 @@ class TrackUpdate {
   [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> rows();
 
   [[nodiscard]] const TrackCounts& counts() const { return counts_; }
+  /// Lower quartile of nis over degrees of freedom of the tracks tried: what single ones follow wrongly does not show.
+  [[nodiscard]] double misfit();
 
  private:
   static constexpr int kStackRows = 1024;
+  static constexpr size_t kMostMisfits = 256;
 
   /// Squared length of the rows' residual by what is expected of it; infinite where that breaks.
   [[nodiscard]] double nis(int first_row, int rows);
@@ -54,6 +56,7 @@ class TrackUpdate {
 
   TrackTuning tuning_;
   TrackCounts counts_;
+  std::vector<double> misfits_;  ///< of the tracks tried
   const TrackWindow* window_ = nullptr;
   std::array<ViewSighting, kMaxViews> straight_;
   Eigen::MatrixXd work_;   ///< kMaxTrackRows x kTrackWidth

@@ -26,7 +26,7 @@ struct CameraOutcome {
   Eigen::Matrix<double, 9, 9> cov = Eigen::Matrix<double, 9, 9>::Zero();
   double lens_nees = 0.0;  ///< of the lens, which is exact
   int updates = 0, used = 0, refused = 0;
-  double misfit = 0.0;
+  double misfit = 0.0;  ///< at the end
   navigation::CameraFitness fitness = navigation::CameraFitness::kOnTrial;
 
   [[nodiscard]] double nees(int first, int size) const {
@@ -129,7 +129,7 @@ inline CameraOutcome drive_by_camera(const TrackDrive& d, const CameraRun& run, 
         ++out.updates;
         out.used += camera.counts().used;
         out.refused += camera.counts().refused;
-        out.misfit += camera.counts().misfit_sum;
+        out.misfit = camera.misfit();
       }
     } else if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && begun && run.camera) {
       TrackPicture picture = picture_of(*frame, run);
@@ -143,7 +143,6 @@ inline CameraOutcome drive_by_camera(const TrackDrive& d, const CameraRun& run, 
   out.cov = filter.state().P().topLeftCorner<9, 9>();
   const Eigen::Vector3d lens = filter.state().x.lens;
   if (!run.two_eyes) out.lens_nees = lens.dot(filter.state().P().block<3, 3>(kLens, kLens).ldlt().solve(lens)) / 3.0;
-  out.misfit /= std::max(1, out.used + out.refused);
   out.fitness = camera.fitness();
   return out;
 }
