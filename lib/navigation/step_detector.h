@@ -74,7 +74,8 @@ class StepDetector {
   int64_t next_us_ = 0;
   int turn_ = 0;
   double usual_ = 1.0;  ///< mean normalised square: measurements may be noisier than they claim
-  Eigen::Matrix<double, kColumns, 1> information_, sum_, squares_;
+  using PerColumn = Eigen::Matrix<double, kColumns, 1>;
+  PerColumn information_ = PerColumn::Zero(), sum_ = PerColumn::Zero(), squares_ = PerColumn::Zero();
 };
 
 }  // namespace roadfix::navigation
