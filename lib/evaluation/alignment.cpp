@@ -90,7 +90,7 @@ std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment al
 
 namespace {
 
-Similarity turned_onto(const PosePair& pair, double yaw) {
+Similarity rotated_onto(const PosePair& pair, double yaw) {
   Similarity S;
   S.T.q = exp_q(Eigen::Vector3d(0.0, 0.0, yaw));
   S.T.p = pair.reference.T_frame_vehicle.p - S.T.q * pair.estimate.T_frame_vehicle.p;
@@ -100,15 +100,15 @@ Similarity turned_onto(const PosePair& pair, double yaw) {
 }  // namespace
 
 Similarity tie(const PosePair& pair) {
-  return turned_onto(pair, yaw_between(pair.estimate.T_frame_vehicle.q, pair.reference.T_frame_vehicle.q));
+  return rotated_onto(pair, yaw_between(pair.estimate.T_frame_vehicle.q, pair.reference.T_frame_vehicle.q));
 }
 
-Similarity tie_by_way(const PosePair& from, const PosePair& to) {
+Similarity tie_by_displacement(const PosePair& from, const PosePair& to) {
   const auto direction = [](const Odometry& a, const Odometry& b) {
-    const Eigen::Vector3d way = b.T_frame_vehicle.p - a.T_frame_vehicle.p;
-    return std::atan2(way.y(), way.x());
+    const Eigen::Vector3d displacement = b.T_frame_vehicle.p - a.T_frame_vehicle.p;
+    return std::atan2(displacement.y(), displacement.x());
   };
-  return turned_onto(from, direction(from.reference, to.reference) - direction(from.estimate, to.estimate));
+  return rotated_onto(from, direction(from.reference, to.reference) - direction(from.estimate, to.estimate));
 }
 
 Odometry transformed(const Similarity& S, const Odometry& pose) {

@@ -35,8 +35,8 @@ std::optional<Similarity> align(const std::vector<PosePair>& pairs, Alignment al
 /// The similarity of kTied: the estimate's yaw and position become the reference's at this pair. Needs attitude.
 Similarity tie(const PosePair& pair);
 
-/// The same for a reference without attitude: the yaw is that of the way from the first pair to the second.
-Similarity tie_by_way(const PosePair& from, const PosePair& to);
+/// The same for a reference without attitude: the yaw is that of the displacement from the first pair to the second.
+Similarity tie_by_displacement(const PosePair& from, const PosePair& to);
 
 Odometry transformed(const Similarity& S, const Odometry& pose);
 

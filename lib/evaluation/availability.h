@@ -1,4 +1,4 @@
-/// When was there an estimate, and did it say that it may be trusted?
+/// When was there an estimate, and was it published as valid?
 #pragma once
 
 #include <cstdint>

@@ -25,7 +25,7 @@ struct PoseError {
   [[nodiscard]] double horizontal() const { return position_frame.head<2>().norm(); }
 };
 
-/// What the reference can tell about.
+/// What the reference holds.
 struct ReferenceKind {
   bool attitude = true;
   bool velocity = true;

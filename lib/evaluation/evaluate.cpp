@@ -10,7 +10,7 @@ constexpr double kDelayStep_s = 0.05;
 constexpr int kDelaySteps = 40;  ///< to either side
 constexpr double kDelayPrecision_s = 1e-4;
 constexpr int64_t kPathInterval_us = 100'000;
-constexpr double kWayOfTie = 50.0;  // m
+constexpr double kTieDistance = 50.0;  // m
 
 /// Fixes that the estimators were given prove nothing, a reference of another origin does.
 bool withheld_only(const DriveFacts& facts) { return facts.score_withheld_only && facts.reference.from_fixes; }
@@ -123,43 +123,45 @@ std::optional<Similarity> chosen_similarity(const ChannelScore& report, const Dr
   return tie(tie_pair(report.scored, facts, options));
 }
 
-double level_way(const PosePair& from, const PosePair& to) {
+double horizontal_distance(const PosePair& from, const PosePair& to) {
   return (to.reference.T_frame_vehicle.p - from.reference.T_frame_vehicle.p).head<2>().norm();
 }
 
-/// Ties the pairs to a reference without attitude by the first 50 m of way; what the reference's own error makes of yaw
+/// Ties the pairs to a reference without attitude by the first 50 m of path; what the reference's error makes of yaw
 /// and place is added to the covariance. Nothing where the drive is shorter.
-std::vector<PosePair> tied_by_way(std::vector<PosePair> pairs, const std::vector<PosePair>& all, double sigma) {
+std::vector<PosePair> tied_by_displacement(std::vector<PosePair> pairs, const std::vector<PosePair>& all,
+                                           double sigma) {
   const PosePair& start = all.front();
-  const auto to = std::ranges::find_if(all, [&](const PosePair& p) { return level_way(start, p) >= kWayOfTie; });
+  const auto to =
+      std::ranges::find_if(all, [&](const PosePair& p) { return horizontal_distance(start, p) >= kTieDistance; });
   if (to == all.end()) return {};
-  transform_estimates(tie_by_way(start, *to), pairs);
-  const double yaw_sigma = std::sqrt(2.0) * sigma / level_way(start, *to);
+  transform_estimates(tie_by_displacement(start, *to), pairs);
+  const double yaw_sigma = std::sqrt(2.0) * sigma / horizontal_distance(start, *to);
   for (PosePair& pair : pairs) {
-    const Eigen::Vector3d way = pair.estimate.T_frame_vehicle.p - start.reference.T_frame_vehicle.p;
-    const Eigen::Vector3d turned = Eigen::Vector3d::UnitZ().cross(way) * yaw_sigma;
+    const Eigen::Vector3d displacement = pair.estimate.T_frame_vehicle.p - start.reference.T_frame_vehicle.p;
+    const Eigen::Vector3d turned = Eigen::Vector3d::UnitZ().cross(displacement) * yaw_sigma;
     pair.estimate.cov_pose.topLeftCorner<3, 3>() += turned * turned.transpose();
     pair.estimate.cov_pose.topLeftCorner<3, 3>().diagonal().array() += sigma * sigma;
   }
   return pairs;
 }
 
-/// The scored pairs as the published covariance means them. An odometry's covariance grows from its own start, so it is
+/// The scored pairs in the frame of the published covariance. An odometry's covariance grows from its start, so it is
 /// tied to the reference there; the alignment over the whole drive would spread errors to where none are claimed.
 /// Nothing where it cannot be tied.
-std::vector<PosePair> honest_pairs(const ChannelScore& report, const std::vector<PosePair>& unaligned,
-                                   const Reference& reference, const DriveFacts& facts, const EstimateInput& estimate,
-                                   const ReferenceKind& kind) {
+std::vector<PosePair> tied_pairs(const ChannelScore& report, const std::vector<PosePair>& unaligned,
+                                 const Reference& reference, const DriveFacts& facts, const EstimateInput& estimate,
+                                 const ReferenceKind& kind) {
   if (!estimate.local_frame || estimate.scale_unknown) return report.scored;
   const auto all = associate(estimate.trajectory, reference.trajectory, facts.reference.from_fixes);
   if (all.empty()) return report.scored;
-  if (!kind.attitude) return tied_by_way(unaligned, all, facts.reference.sigma_m);
+  if (!kind.attitude) return tied_by_displacement(unaligned, all, facts.reference.sigma_m);
   std::vector<PosePair> tied = unaligned;
   transform_estimates(tie(all.front()), tied);
   return tied;
 }
 
-void take_to_reference_point(EstimateInput& estimate) {
+void move_to_reference_point(EstimateInput& estimate) {
   if (!estimate.trajectory.has_attitude || estimate.lever_arm.isZero(0.0)) return;
   for (Odometry& pose : estimate.trajectory.poses) pose = at_lever_arm(pose, estimate.lever_arm);
 }
@@ -227,7 +229,7 @@ std::string seconds_text(int64_t from_us, int64_t to_us) {
 }
 
 /// Why the estimate and the reference have no time in common that may be scored.
-std::string lack_of_pairs(const Reference& reference, const DriveFacts& facts, const Trajectory& estimate) {
+std::string why_no_pairs(const Reference& reference, const DriveFacts& facts, const Trajectory& estimate) {
   const auto& poses = estimate.poses;
   if (poses.empty()) return "it has no poses";
   const auto is_invalid = [](const Odometry& pose) { return pose.validity == Validity::kInvalid; };
@@ -248,7 +250,7 @@ std::string lack_of_pairs(const Reference& reference, const DriveFacts& facts, c
                               : "no part of the reference that may be scored lies where it is valid";
 }
 
-std::string lack_of_alignment(const ChannelScore& report, const ReferenceKind& kind) {
+std::string why_no_alignment(const ChannelScore& report, const ReferenceKind& kind) {
   const std::string name = name_of(report.alignment);
   if (report.alignment == Alignment::kTied && !kind.attitude) return "to be tied, both need an attitude";
   if (report.scored.size() < 3) return "fewer than three poses can be compared, too few for the alignment " + name;
@@ -278,7 +280,7 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
                 [begin = begin_us, end = end_us](const ModeSample& m) { return m.t_us < begin || m.t_us > end; });
   report.modes = mode_accuracy(estimate.modes, reference.trajectory, options.turn_threshold);
 
-  take_to_reference_point(estimate);
+  move_to_reference_point(estimate);
   if (options.fit_delay) report.delay_s = fitted_delay(reference, facts, estimate.trajectory, report.alignment);
   report.scored = scored_pairs(reference, facts, estimate.trajectory, report.delay_s);
   for (const Alignment alignment : {Alignment::kNone, Alignment::kYaw, Alignment::kSe3, Alignment::kSim3}) {
@@ -287,9 +289,9 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
   }
   const auto S = chosen_similarity(report, facts, kind, options);
   const std::vector<PosePair> unaligned = report.scored;
-  if (report.scored.empty()) report.no_figures = lack_of_pairs(reference, facts, estimate.trajectory);
+  if (report.scored.empty()) report.no_figures = why_no_pairs(reference, facts, estimate.trajectory);
   if (!S) {
-    if (report.no_figures.empty()) report.no_figures = lack_of_alignment(report, kind);
+    if (report.no_figures.empty()) report.no_figures = why_no_alignment(report, kind);
     report.scored.clear();
   } else {
     report.similarity = *S;
@@ -298,9 +300,9 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
   measure_pairs(report, kind, options);
   report.usable = usable_share(report, options.usable_within);
   if (!report.scored.empty()) {
-    const auto honest = honest_pairs(report, unaligned, reference, facts, estimate, kind);
-    report.honesty = honesty(honest, kind, facts.reference.sigma_m);
-    report.sigmas = sigma_samples(honest.empty() ? report.scored : honest, kind, facts.reference.sigma_m);
+    const auto tied = tied_pairs(report, unaligned, reference, facts, estimate, kind);
+    report.consistency = covariance_consistency(tied, kind, facts.reference.sigma_m);
+    report.sigmas = sigma_samples(tied.empty() ? report.scored : tied, kind, facts.reference.sigma_m);
   }
   align_in_place(estimate.trajectory, report.similarity, report.delay_s);
   measure_outages(report, reference, facts, estimate.trajectory, kind);

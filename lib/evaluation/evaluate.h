@@ -7,10 +7,10 @@
 
 #include "evaluation/alignment.h"
 #include "evaluation/availability.h"
+#include "evaluation/covariance_consistency.h"
 #include "evaluation/drift.h"
 #include "evaluation/drive_facts.h"
 #include "evaluation/errors.h"
-#include "evaluation/honesty.h"
 #include "evaluation/modes.h"
 #include "evaluation/outages.h"
 
@@ -86,8 +86,9 @@ struct ChannelScore {
   std::optional<double> tse_m;
   std::optional<Reconvergence> rct;
   std::optional<ModeAccuracy> modes;
-  Honesty honesty;  ///< of an estimate in its own frame: tied to the reference at its start, whatever the alignment;
-                    ///< empty where the reference has neither attitude nor way enough for that
+  /// Of an estimate in its own frame: tied to the reference at its start, whatever the alignment; empty where the
+  /// reference has neither attitude nor path enough for that.
+  CovarianceConsistency consistency;
   Availability availability;
   std::optional<double> usable;    ///< share of the time with a pose, valid or coasting, that is `usable_within` of the
                                    ///< truth; none where nothing is scored

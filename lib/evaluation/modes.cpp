@@ -9,7 +9,7 @@
 namespace roadfix {
 namespace {
 
-/// Below this speed the course of a noisy velocity says nothing about turning.
+/// Below this speed the course of a noisy velocity is no measure of turning.
 constexpr double kCourseSpeed = 2.0;
 /// Yaw rates are differences over at least this time: quantised or noisy references would drown shorter ones.
 constexpr int64_t kRateBase_us = 200'000;
@@ -55,9 +55,9 @@ std::optional<ModeAccuracy> mode_accuracy(const std::vector<ModeSample>& modes, 
     }
     if (nearest == rates.end() || std::abs(nearest->first - mode.t_us) > reach_us) continue;
     const bool turn = std::abs(nearest->second) > threshold_radps;
-    const bool says_turn = mode.turn_probability > 0.5;
+    const bool predicts_turn = mode.turn_probability > 0.5;
     ++counts[turn];
-    if (turn == says_turn) ++hits[turn];
+    if (turn == predicts_turn) ++hits[turn];
   }
   const int samples = counts[0] + counts[1];
   if (samples == 0) return std::nullopt;

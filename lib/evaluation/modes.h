@@ -18,7 +18,7 @@ struct ModeAccuracy {
   double threshold = 0.0;                ///< rad/s, the yaw rate that counts as a turn
   double percent = 0.0;                  ///< MPA, (13)
   double balanced_percent = 0.0;         ///< mean of both classes' hit rates; the one that occurs where only one does
-  double always_straight_percent = 0.0;  ///< MPA of an estimator that never says turn
+  double always_straight_percent = 0.0;  ///< MPA of an estimator that never predicts a turn
   int samples = 0;
   int turns = 0;
 };

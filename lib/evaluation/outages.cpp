@@ -10,7 +10,7 @@ namespace {
 
 /// Lee et al. (2025), section 4.3.2: "1.1 times the mean ATE".
 constexpr double kReconvergenceFactor = 1.1;
-/// Below this path an outage is standing still and an error in percent of it says nothing.
+/// Below this path an outage is standing still and an error in percent of it means nothing.
 constexpr double kStandstill_m = 1.0;
 
 double path_between(const Trajectory& reference, int64_t begin_us, int64_t end_us) {

@@ -84,7 +84,7 @@ Odometry at_lever_arm(const Odometry& pose, const Eigen::Vector3d& lever_arm) {
 
 namespace {
 
-/// Mean time between poses; unlike the median it tells keyframes, of which some follow each other closely.
+/// Mean time between poses; unlike the median it shows keyframes, of which some follow each other closely.
 double mean_interval_s(const Trajectory& trajectory) {
   const auto& poses = trajectory.poses;
   if (poses.size() < 2) return 0.0;

@@ -27,7 +27,7 @@ Json axes_json(const AxisErrors& axes) {
   return json;
 }
 
-Json honesty_json(const HonestyRow& row, double unit = 1.0) {
+Json consistency_json(const ConsistencyRow& row, double unit = 1.0) {
   return {{"nees_per_dof", row.nees_per_dof},
           {"median_error", row.median_error / unit},
           {"median_sigma", row.median_sigma / unit},
@@ -36,11 +36,11 @@ Json honesty_json(const HonestyRow& row, double unit = 1.0) {
           {"unusable", row.unusable}};
 }
 
-Json honesty_json(const Honesty& h) {
-  Json json = {{"position_m", honesty_json(h.position)}, {"horizontal_m", honesty_json(h.horizontal)}};
-  if (h.attitude) json["attitude_deg"] = honesty_json(*h.attitude, kDegree);
-  if (h.velocity) json["velocity_mps"] = honesty_json(*h.velocity);
-  if (h.pose) json["pose"] = honesty_json(*h.pose);
+Json consistency_json(const CovarianceConsistency& h) {
+  Json json = {{"position_m", consistency_json(h.position)}, {"horizontal_m", consistency_json(h.horizontal)}};
+  if (h.attitude) json["attitude_deg"] = consistency_json(*h.attitude, kDegree);
+  if (h.velocity) json["velocity_mps"] = consistency_json(*h.velocity);
+  if (h.pose) json["pose"] = consistency_json(*h.pose);
   return json;
 }
 
@@ -125,7 +125,7 @@ Json channel_json(const ChannelScore& c) {
   json["errors"] = axes_json(c.axes);
   add_relative(c, json);
   add_transitions(c, json);
-  json["honesty"] = honesty_json(c.honesty);
+  json["honesty"] = consistency_json(c.consistency);
   json["availability"] = {{"valid", c.availability.valid},
                           {"coasting", c.availability.coasting},
                           {"invalid", c.availability.invalid},

@@ -34,7 +34,7 @@ std::string axes_rows(const AxisErrors& axes) {
   return text;
 }
 
-std::string honesty_row(const std::string& name, const HonestyRow& r, double unit = 1.0) {
+std::string consistency_row(const std::string& name, const ConsistencyRow& r, double unit = 1.0) {
   std::string text =
       fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}", name, number(r.nees_per_dof), number(r.median_error / unit),
                   number(r.median_sigma / unit), percent(r.within_3sigma));
@@ -42,16 +42,16 @@ std::string honesty_row(const std::string& name, const HonestyRow& r, double uni
   return text + "\n";
 }
 
-std::string honesty_rows(const Honesty& h) {
+std::string consistency_rows(const CovarianceConsistency& h) {
   if (h.position.samples == 0 && h.position.unusable == 0) return "  covariance: not judged, no 50 m from the start\n";
   if (h.position.samples == 0) return "  covariance: none that is positive definite\n";
   std::string text =
       fmt::format("  {:<18}{:>10}{:>10}{:>10}{:>10}\n", "covariance", "NEES/dof", "error", "sigma", "in 3 s");
-  text += honesty_row("horizontal m", h.horizontal);
-  text += honesty_row("position m", h.position);
-  if (h.attitude) text += honesty_row("attitude deg", *h.attitude, kDegree);
-  if (h.velocity) text += honesty_row("velocity m/s", *h.velocity);
-  if (h.pose) text += honesty_row("pose", *h.pose);
+  text += consistency_row("horizontal m", h.horizontal);
+  text += consistency_row("position m", h.position);
+  if (h.attitude) text += consistency_row("attitude deg", *h.attitude, kDegree);
+  if (h.velocity) text += consistency_row("velocity m/s", *h.velocity);
+  if (h.pose) text += consistency_row("pose", *h.pose);
   return text;
 }
 
@@ -104,7 +104,7 @@ std::string channel_text(const ChannelScore& c) {
   if (c.delay_s != 0.0) text += fmt::format(", reference {:.3f} s late (fitted)", c.delay_s);
   text += fmt::format("\n  {} scored of {} poses, {:.0f} s, {:.0f} m\n", c.pairs, c.poses, c.duration_s, c.distance_m);
   if (!c.no_figures.empty()) text += "  no figures: " + c.no_figures + "\n";
-  if (c.pairs > 0) text += axes_rows(c.axes) + honesty_rows(c.honesty) + trajectory_lines(c);
+  if (c.pairs > 0) text += axes_rows(c.axes) + consistency_rows(c.consistency) + trajectory_lines(c);
   text += outage_lines(c);
   const Availability& a = c.availability;
   text += fmt::format("  valid {}, coasting {}, invalid {}, silent {} of the time", percent(a.valid),
@@ -135,7 +135,7 @@ std::string overview(const EvaluationReport& report) {
                         any ? number(c.axes.horizontal.rms) : "-", any ? number(c.axes.horizontal.p95) : "-",
                         any ? number(c.axes.vertical.rms) : "-",
                         any && c.axes.yaw ? number(c.axes.yaw->rms / kDegree) : "-",
-                        c.honesty.position.samples > 0 ? percent(c.honesty.position.within_3sigma) : "-",
+                        c.consistency.position.samples > 0 ? percent(c.consistency.position.within_3sigma) : "-",
                         c.usable ? fmt::format("{:.1f} %", 100.0 * *c.usable) : "-");
   }
   return text;

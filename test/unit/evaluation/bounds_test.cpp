@@ -40,14 +40,14 @@ TEST_CASE("bounds: bins are an eighth of a decade wide, and the ends take what i
 TEST_CASE("bounds: honest errors are above three sigma about once in a hundred, of twice the size in a third") {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  std::vector<PosePair> honest, overconfident;
+  std::vector<PosePair> consistent, overconfident;
   for (int i = 0; i < 20000; ++i) {
     const Eigen::Vector2d error(normal(random), normal(random));
-    honest.push_back(pair_with(error, Eigen::Matrix2d::Identity()));
+    consistent.push_back(pair_with(error, Eigen::Matrix2d::Identity()));
     overconfident.push_back(pair_with(2.0 * error, Eigen::Matrix2d::Identity()));
   }
   // Rayleigh: P(|e| > 3) = exp(-4.5) = 0.0111; of errors twice as large exp(-1.125) = 0.325.
-  const BoundHistogram fair = horizontal_bounds(honest, 0.0);
+  const BoundHistogram fair = horizontal_bounds(consistent, 0.0);
   CHECK(fair.samples() == 20000);
   CHECK(static_cast<double>(fair.exceeded()) / 20000 == Approx(0.0111).margin(0.003));
   CHECK(static_cast<double>(horizontal_bounds(overconfident, 0.0).exceeded()) / 20000 == Approx(0.325).margin(0.02));

@@ -183,8 +183,8 @@ TEST_CASE("a rig whose x axis points up is tied by its turn about the vertical")
   }));
   estimate.local_frame = true;
   const ChannelScore report = evaluate_channel(reference, exact_facts(), estimate, {});
-  REQUIRE(report.honesty.attitude);
-  CHECK(report.honesty.attitude->nees_per_dof < 1.0);
+  REQUIRE(report.consistency.attitude);
+  CHECK(report.consistency.attitude->nees_per_dof < 1.0);
   CHECK(report.axes.yaw->max < 1e-5);
 }
 
@@ -200,17 +200,18 @@ TEST_CASE("an odometry's covariance is judged from its own start") {
   estimate.local_frame = true;
   const ChannelScore report = evaluate_channel(exact_reference(), exact_facts(), estimate, {});
   CHECK(report.alignment == Alignment::kYaw);
-  CHECK(report.honesty.position.nees_per_dof == Approx(1.0 / 3.0).epsilon(0.02));
-  CHECK(report.honesty.position.within_3sigma == Approx(1.0));
+  CHECK(report.consistency.position.nees_per_dof == Approx(1.0 / 3.0).epsilon(0.02));
+  CHECK(report.consistency.position.within_3sigma == Approx(1.0));
   estimate.local_frame = false;
   EvaluationOptions aligned;
   aligned.alignment = Alignment::kYaw;
-  CHECK(evaluate_channel(exact_reference(), exact_facts(), estimate, aligned).honesty.position.nees_per_dof > 100.0);
+  CHECK(evaluate_channel(exact_reference(), exact_facts(), estimate, aligned).consistency.position.nees_per_dof >
+        100.0);
 }
 
 TEST_CASE("an odometry's covariance is judged from its own start by a reference without attitude, too") {
   // Yaw drifts by 0.002 deg a second and is claimed so; the first 50 m cost a hundredth of a degree.
-  const auto judged = [](double claimed, double sigma, double end_s) {
+  const auto consistency_of = [](double claimed, double sigma, double end_s) {
     auto estimate = estimate_of(changed(eight_trajectory(0.0, end_s, 0.1), [&](Odometry& pose) {
       const double turned = 3.5e-5 * seconds_between(0, pose.t_us);
       const Eigen::Vector3d p = pose.T_frame_vehicle.p - test::eight(0.0).T_frame_vehicle.p;
@@ -223,15 +224,15 @@ TEST_CASE("an odometry's covariance is judged from its own start by a reference 
     facts.reference = {ReferenceOf::kImu, false, false, false, sigma};
     Reference reference = exact_reference();
     reference.trajectory.has_attitude = false;
-    return evaluate_channel(reference, facts, estimate, {}).honesty.position;
+    return evaluate_channel(reference, facts, estimate, {}).consistency.position;
   };
-  const HonestyRow honest = judged(1.0, 0.0, 200.0);
-  CHECK(honest.samples > 1900);
-  CHECK(honest.nees_per_dof < 1.0);
-  CHECK(honest.within_3sigma == Approx(1.0));
-  CHECK(judged(0.1, 0.0, 200.0).nees_per_dof > 10.0);                          // teeth
-  CHECK(judged(0.1, 0.5, 200.0).nees_per_dof < 1.0);                           // nobody can know with such a reference
-  CHECK(judged(1.0, 0.0, 3.0).samples + judged(1.0, 0.0, 3.0).unusable == 0);  // too short to be tied
+  const ConsistencyRow consistent = consistency_of(1.0, 0.0, 200.0);
+  CHECK(consistent.samples > 1900);
+  CHECK(consistent.nees_per_dof < 1.0);
+  CHECK(consistent.within_3sigma == Approx(1.0));
+  CHECK(consistency_of(0.1, 0.0, 200.0).nees_per_dof > 10.0);  // teeth
+  CHECK(consistency_of(0.1, 0.5, 200.0).nees_per_dof < 1.0);   // nobody can know with such a reference
+  CHECK(consistency_of(1.0, 0.0, 3.0).samples + consistency_of(1.0, 0.0, 3.0).unusable == 0);  // too short to be tied
 }
 
 TEST_CASE("a constant latency of the reference is found where it is asked for") {

@@ -91,7 +91,7 @@ TEST_CASE("an estimate without covariance is said to have none") {
     writer.commit();
   }
   const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
-  CHECK(report.channels[0].honesty.position.unusable == report.channels[0].pairs);
+  CHECK(report.channels[0].consistency.position.unusable == report.channels[0].pairs);
   CHECK(report_table(report).find("covariance: none") != std::string::npos);
 }
 

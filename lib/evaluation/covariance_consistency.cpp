@@ -1,4 +1,4 @@
-#include "evaluation/honesty.h"
+#include "evaluation/covariance_consistency.h"
 
 #include <cmath>
 
@@ -24,7 +24,7 @@ Normalised normalised(const PosePair& pair, double reference_sigma) {
   return n;
 }
 
-class Collector {
+class ConsistencySum {
  public:
   /// Median error and sigma are taken from the first `shown` axes.
   void add(const Eigen::VectorXd& error, const Eigen::MatrixXd& cov, int shown) {
@@ -42,8 +42,8 @@ class Collector {
     }
   }
 
-  [[nodiscard]] HonestyRow row() const {
-    HonestyRow row = row_;
+  [[nodiscard]] ConsistencyRow row() const {
+    ConsistencyRow row = row_;
     row.samples = accumulator_.count();
     row.nees_per_dof = accumulator_.ratio();
     row.median_error = median(errors_);
@@ -53,7 +53,7 @@ class Collector {
   }
 
  private:
-  HonestyRow row_;
+  ConsistencyRow row_;
   ConsistencyAccumulator accumulator_;
   std::vector<double> errors_, sigmas_;
   int axes_ = 0;
@@ -62,8 +62,9 @@ class Collector {
 
 }  // namespace
 
-Honesty honesty(const std::vector<PosePair>& pairs, const ReferenceKind& kind, double reference_sigma) {
-  Collector position, horizontal, attitude, pose, velocity;
+CovarianceConsistency covariance_consistency(const std::vector<PosePair>& pairs, const ReferenceKind& kind,
+                                             double reference_sigma) {
+  ConsistencySum position, horizontal, attitude, pose, velocity;
   for (const PosePair& pair : pairs) {
     const Normalised n = normalised(pair, reference_sigma);
     position.add(n.error.head<3>(), n.cov.topLeftCorner<3, 3>(), 3);
@@ -76,7 +77,7 @@ Honesty honesty(const std::vector<PosePair>& pairs, const ReferenceKind& kind, d
       velocity.add(pose_error(pair, kind).velocity, pair.estimate.cov_velocity, 3);
     }
   }
-  Honesty out;
+  CovarianceConsistency out;
   out.position = position.row();
   out.horizontal = horizontal.row();
   if (kind.attitude) {

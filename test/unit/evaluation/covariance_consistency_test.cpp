@@ -1,4 +1,4 @@
-#include "evaluation/honesty.h"
+#include "evaluation/covariance_consistency.h"
 
 #include <catch2/catch.hpp>
 #include <random>
@@ -36,7 +36,7 @@ std::vector<PosePair> noisy_pairs(double claim) {
 }
 
 TEST_CASE("errors of the stated covariance have NEES one and 99.7 percent within three sigma") {
-  const Honesty h = honesty(noisy_pairs(1.0), {}, 0.0);
+  const CovarianceConsistency h = covariance_consistency(noisy_pairs(1.0), {}, 0.0);
   // 4000 samples: one standard deviation of the ratio is sqrt(2 / (4000 dof)), at most 0.013.
   CHECK(h.position.nees_per_dof == Approx(1.0).margin(0.05));
   CHECK(h.attitude->nees_per_dof == Approx(1.0).margin(0.05));
@@ -47,23 +47,23 @@ TEST_CASE("errors of the stated covariance have NEES one and 99.7 percent within
 }
 
 TEST_CASE("overconfident and inflated covariances both show") {
-  CHECK(honesty(noisy_pairs(0.25), {}, 0.0).pose->nees_per_dof == Approx(4.0).margin(0.2));
-  CHECK(honesty(noisy_pairs(0.25), {}, 0.0).position.within_3sigma < 0.95);
-  const Honesty inflated = honesty(noisy_pairs(25.0), {}, 0.0);
+  CHECK(covariance_consistency(noisy_pairs(0.25), {}, 0.0).pose->nees_per_dof == Approx(4.0).margin(0.2));
+  CHECK(covariance_consistency(noisy_pairs(0.25), {}, 0.0).position.within_3sigma < 0.95);
+  const CovarianceConsistency inflated = covariance_consistency(noisy_pairs(25.0), {}, 0.0);
   CHECK(inflated.position.nees_per_dof < 0.1);
   CHECK(inflated.position.median_sigma > 5.0 * inflated.position.median_error);
 }
 
 TEST_CASE("the reference's own sigma is added") {
-  const double without = honesty(noisy_pairs(1.0), {}, 0.0).position.nees_per_dof;
-  CHECK(honesty(noisy_pairs(1.0), {}, 1.0).position.nees_per_dof < 0.1 * without);
+  const double without = covariance_consistency(noisy_pairs(1.0), {}, 0.0).position.nees_per_dof;
+  CHECK(covariance_consistency(noisy_pairs(1.0), {}, 1.0).position.nees_per_dof < 0.1 * without);
 }
 
 TEST_CASE("a covariance that is none is counted and not scored") {
   auto pairs = noisy_pairs(1.0);
   pairs[0].estimate.cov_pose.setZero();
   pairs[1].estimate.cov_pose(0, 0) = -1.0;
-  const Honesty h = honesty(pairs, {}, 0.0);
+  const CovarianceConsistency h = covariance_consistency(pairs, {}, 0.0);
   CHECK(h.position.unusable == 2);
   CHECK(h.position.samples == 3998);
 }

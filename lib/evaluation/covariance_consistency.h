@@ -1,5 +1,5 @@
-/// Are the published covariances what the errors are? NEES with the median sigma beside the median error, and the share
-/// of errors within three sigma. The NEES of one drive has no band: its errors are correlated in time.
+/// Are the published covariances consistent with the errors? NEES with the median sigma beside the median error, and
+/// the share of errors within three sigma. The NEES of one drive has no band: its errors are correlated in time.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 namespace roadfix {
 
 /// One kind of error of one drive.
-struct HonestyRow {
+struct ConsistencyRow {
   int samples = 0;
   int unusable = 0;            ///< covariances that are not positive definite
   double nees_per_dof = 0.0;   ///< mean over samples
@@ -19,12 +19,12 @@ struct HonestyRow {
   double within_3sigma = 0.0;  ///< share of single axes
 };
 
-struct Honesty {
-  HonestyRow position;                 ///< m, 3 axes
-  HonestyRow horizontal;               ///< m, 2 axes
-  std::optional<HonestyRow> attitude;  ///< rad, 3 axes
-  std::optional<HonestyRow> pose;      ///< 6 axes; medians are those of the position
-  std::optional<HonestyRow> velocity;  ///< m/s, 3 axes
+struct CovarianceConsistency {
+  ConsistencyRow position;                 ///< m, 3 axes
+  ConsistencyRow horizontal;               ///< m, 2 axes
+  std::optional<ConsistencyRow> attitude;  ///< rad, 3 axes
+  std::optional<ConsistencyRow> pose;      ///< 6 axes; medians are those of the position
+  std::optional<ConsistencyRow> velocity;  ///< m/s, 3 axes
 };
 
 /// One sample of the series that the plots show; nothing where the covariance is unusable.
@@ -37,7 +37,8 @@ struct SigmaSample {
 };
 
 /// `reference_sigma` is added to the position covariance: the reference's own error.
-Honesty honesty(const std::vector<PosePair>& pairs, const ReferenceKind& kind, double reference_sigma);
+CovarianceConsistency covariance_consistency(const std::vector<PosePair>& pairs, const ReferenceKind& kind,
+                                             double reference_sigma);
 std::vector<SigmaSample> sigma_samples(const std::vector<PosePair>& pairs, const ReferenceKind& kind,
                                        double reference_sigma);
 
