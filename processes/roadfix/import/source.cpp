@@ -7,6 +7,7 @@
 #include "config/config_error.h"
 #include "roadfix/import/drive_folder.h"
 #include "roadfix/import/euroc.h"
+#include "roadfix/import/imu_check.h"
 #include "roadfix/import/kitti.h"
 #include "roadfix/import/kitti_raw.h"
 #include "roadfix/import/pose_files.h"
@@ -86,13 +87,23 @@ std::string detect_format(const fs::path& source) {
   throw ConfigError(source.string(), 0, "is no format known here: " + (likely.empty() ? lacks : likely));
 }
 
-Drive read_source(const fs::path& source, const SourceOptions& options) {
+namespace {
+
+Drive read_format(const fs::path& source, const SourceOptions& options) {
   if (options.format == "folder") return read_drive_folder(source);
   if (options.format == "kitti") return read_kitti(source);
   if (options.format == "kitti_raw") return read_kitti_raw(source, options.gnss_from_oxts);
   if (options.format == "euroc") return read_euroc(source);
   if (options.format == "rosbag") return read_rosbag(source, options.topics);
   return read_poses(source, {options.sequence, options.times, options.reference});
+}
+
+}  // namespace
+
+Drive read_source(const fs::path& source, const SourceOptions& options) {
+  Drive drive = read_format(source, options);
+  for (const std::string& remark : imu_remarks(drive)) drive.remarks.push_back(remark);
+  return drive;
 }
 
 }  // namespace roadfix
