@@ -117,8 +117,8 @@ KalibrCameras parse_kalibr(const std::string& text, const std::string& file) {
   if (!T_body_second && T_body_first && chain.cam1->T_cn_cnm1)
     T_body_second = *T_body_first * se3(*chain.cam1->T_cn_cnm1).inverse();
   out.right = camera(*chain.cam1, T_body_second);
-  const bool swapped = T_body_first && T_body_second && (T_body_first->inverse() * *T_body_second).p.x() < 0.0;
-  if (swapped) std::swap(out.left, *out.right);
+  out.swapped = T_body_first && T_body_second && (T_body_first->inverse() * *T_body_second).p.x() < 0.0;
+  if (out.swapped) std::swap(out.left, *out.right);
   return out;
 }
 

@@ -13,6 +13,7 @@ namespace roadfix {
 struct KalibrCameras {
   CameraCalibration left;
   std::optional<CameraCalibration> right;  ///< of a chain of two: the one that lies to the right of the other
+  bool swapped = false;                    ///< cam1 lies to the left of cam0: it is `left`
 };
 
 /// Size, lens, place (where the chain has it) and time offset; the rest is absent. ConfigError for a model that we do

@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "config/config.h"
+#include "config/kalibr.h"
 #include "geometry/so3.h"
 #include "roadfix/import/csv_reader.h"
+#include "roadfix/import/sample_rate.h"
 
 namespace roadfix {
 namespace {
@@ -154,15 +157,19 @@ std::vector<ImuSample> read_imu(const fs::path& path) {
 }
 
 std::vector<LocalPose> read_groundtruth(const fs::path& path) {
-  constexpr const char* kShortTime = "#timestamp";
-  CsvReader csv(path,
-                {joined({{kShortTime}, columns3("p_RS_R", "m"), {"q_RS_w []", "q_RS_x []", "q_RS_y []", "q_RS_z []"}}),
-                 {columns3("v_RS_R", "m s^-1"), columns3("b_w_RS_S", "rad s^-1"), columns3("b_a_RS_S", "m s^-2")}});
+  constexpr const char* kShortTime = "#timestamp";  // EuRoC's; TUM VI's has the unit
+  CsvReader csv(path, {joined({columns3("p_RS_R", "m"), {"q_RS_w []", "q_RS_x []", "q_RS_y []", "q_RS_z []"}}),
+                       {{kTime},
+                        {kShortTime},
+                        columns3("v_RS_R", "m s^-1"),
+                        columns3("b_w_RS_S", "rad s^-1"),
+                        columns3("b_a_RS_S", "m s^-2")}});
+  const int time = csv.index(csv.has(kTime) ? kTime : kShortTime);
   const bool has_velocity = csv.has("v_RS_R_x [m s^-1]");
   std::vector<LocalPose> poses;
   while (csv.next()) {
     LocalPose pose;
-    pose.t_us = csv.utime(csv.index(kShortTime), kNanosecondsPerMicrosecond);
+    pose.t_us = csv.utime(time, kNanosecondsPerMicrosecond);
     const auto part = [&](const char* column) { return csv.number(csv.index(column), -1.001, 1.001); };
     const Eigen::Quaterniond q(part("q_RS_w []"), part("q_RS_x []"), part("q_RS_y []"), part("q_RS_z []"));
     if (std::abs(q.norm() - 1.0) > 1e-3) csv.fail(csv.index("q_RS_w []"), "the quaternion must have unit norm");
@@ -181,37 +188,125 @@ ImuCalibration imu_calibration(const SensorYaml& yaml) {
   return imu;  // the random walks say how biases move, not how large they are: those stay unknown
 }
 
+/// TUM VI's dso/imu_config.yaml.
+struct TumImu {
+  std::string rostopic;
+  std::optional<double> update_rate;
+  std::optional<double> accelerometer_noise_density, accelerometer_random_walk;
+  std::optional<double> gyroscope_noise_density, gyroscope_random_walk;
+};
+
+template <class Visitor>
+void visit(TumImu& c, Visitor& v) {
+  v.text("rostopic", c.rostopic);
+  v.optional_number("update_rate", c.update_rate, 0.01, 10000.0);
+  v.optional_number("accelerometer_noise_density", c.accelerometer_noise_density, 0.0, 10.0);
+  v.optional_number("accelerometer_random_walk", c.accelerometer_random_walk, 0.0, 10.0);
+  v.optional_number("gyroscope_noise_density", c.gyroscope_noise_density, 0.0, 1.0);
+  v.optional_number("gyroscope_random_walk", c.gyroscope_random_walk, 0.0, 1.0);
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+class MavImporter {
+ public:
+  MavImporter(const fs::path& mav, const fs::path& above) : mav_(mav), dso_(above / "dso") {
+    drive_.format = "euroc";
+    drive_.description.name = fs::weakly_canonical(above).filename().string();
+    Calibration& calibration = drive_.description.calibration;
+    calibration.body_origin = BodyOrigin::kImu;
+    calibration.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d::Constant(180.0)};
+  }
+
+  Drive take() {
+    take_imu();
+    if (is_there(mav_ / "cam0")) drive_.frames_left = read_frames(mav_ / "cam0");
+    if (is_there(mav_ / "cam1")) drive_.frames_right = read_frames(mav_ / "cam1");
+    if (is_there(mav_ / "cam0") && is_there(mav_ / "cam0" / "sensor.yaml")) {
+      sensors().camera_left = read_camera(mav_ / "cam0" / "sensor.yaml");
+      if (is_there(mav_ / "cam1")) sensors().camera_right = read_camera(mav_ / "cam1" / "sensor.yaml");
+    } else if (is_there(mav_ / "cam0")) {
+      take_chain();
+    }
+    take_truth();
+    return std::move(drive_);
+  }
+
+ private:
+  SensorsCalibration& sensors() { return drive_.description.calibration.sensors; }
+
+  void take_imu() {
+    drive_.imu = read_imu(mav_ / "imu0" / "data.csv");
+    const fs::path yaml = mav_ / "imu0" / "sensor.yaml";
+    const fs::path tum = dso_ / "imu_config.yaml";
+    drive_.description.origin = "EuRoC MAV recording";
+    if (is_there(yaml) || !is_there(tum)) {
+      sensors().imu = imu_calibration(read_sensor_yaml(yaml));
+      return;
+    }
+    const TumImu noise = parse_config<TumImu>(read_text_file(tum), tum.string());
+    sensors().imu = ImuCalibration{};
+    sensors().imu->rate = noise.update_rate;
+    sensors().imu->gyro_noise = noise.gyroscope_noise_density;
+    sensors().imu->accel_noise = noise.accelerometer_noise_density;
+    drive_.description.origin = "TUM VI recording";
+  }
+
+  /// TUM VI has one camchain.yaml of Kalibr in place of a sensor.yaml a camera.
+  void take_chain() {
+    const fs::path path = dso_ / "camchain.yaml";
+    if (!is_there(path)) {
+      throw ConfigError((mav_ / "cam0" / "sensor.yaml").string(), 0,
+                        "no such file, and no " + path.string() + " in its place");
+    }
+    const KalibrCameras cameras = parse_kalibr(read_text_file(path), path.string());
+    if (!drive_.frames_right.empty() && !cameras.right)
+      throw ConfigError(path.string(), 0, "has no cam1, but there is mav0/cam1");
+    sensors().camera_left = cameras.swapped ? cameras.right : cameras.left;
+    if (!drive_.frames_right.empty()) sensors().camera_right = cameras.swapped ? cameras.left : cameras.right;
+    for (auto* camera : {&sensors().camera_left, &sensors().camera_right}) {
+      if (!*camera) continue;
+      (*camera)->colour = CameraColour::kGray;
+      if ((*camera)->distortion->model == DistortionModel::kEquidistant) (*camera)->model = CameraModel::kFisheye;
+    }
+    sensors().camera_left->rate = rate_of(drive_.frames_left);
+    if (sensors().camera_right) sensors().camera_right->rate = rate_of(drive_.frames_right);
+    drive_.remarks.push_back("cameras are calibrated by " + path.string());
+  }
+
+  void take_truth() {
+    constexpr double kMotionCapture = 0.001;  // m, Burri et al. 2016, section 3.2; Schubert et al. 2018, section III
+    const fs::path euroc = mav_ / "state_groundtruth_estimate0";
+    const fs::path tum = mav_ / "mocap0";
+    if (!is_there(euroc) && !is_there(tum)) return;
+    drive_.local_reference = read_groundtruth((is_there(euroc) ? euroc : tum) / "data.csv");
+    drive_.description.reference = {ReferenceOf::kImu, true, kMotionCapture};
+    if (!is_there(euroc)) tell_gap();
+  }
+
+  /// TUM VI's motion capture sees the room alone, where most recordings begin and end.
+  void tell_gap() {
+    double longest = 0.0;
+    for (std::size_t i = 1; i < drive_.local_reference.size(); ++i) {
+      const auto& poses = drive_.local_reference;
+      longest = std::max(longest, seconds_between(poses[i - 1].t_us, poses[i].t_us));
+    }
+    if (longest > 1.0) drive_.remarks.push_back(fmt::format("reference (mocap0) has a gap of {:.0f} s", longest));
+  }
+
+  fs::path mav_;
+  fs::path dso_;
+  Drive drive_;
+};
+
 }  // namespace
 
 Drive read_euroc(const fs::path& folder) {
-  std::error_code ignored;
-  const bool is_above = fs::is_directory(folder / "mav0", ignored);
-  const fs::path mav = is_above ? folder / "mav0" : folder;
-  Drive drive;
-  drive.format = "euroc";
-  const fs::path named = fs::weakly_canonical(is_above ? folder : folder / "..");
-  drive.description.name = named.filename().string();
-  drive.description.origin = "EuRoC MAV recording";
-  Calibration& calibration = drive.description.calibration;
-  calibration.body_origin = BodyOrigin::kImu;
-  calibration.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d::Constant(180.0)};
-  drive.imu = read_imu(mav / "imu0" / "data.csv");
-  calibration.sensors.imu = imu_calibration(read_sensor_yaml(mav / "imu0" / "sensor.yaml"));
-  if (fs::exists(mav / "cam0", ignored)) {
-    drive.frames_left = read_frames(mav / "cam0");
-    calibration.sensors.camera_left = read_camera(mav / "cam0" / "sensor.yaml");
-  }
-  if (fs::exists(mav / "cam1", ignored)) {
-    drive.frames_right = read_frames(mav / "cam1");
-    calibration.sensors.camera_right = read_camera(mav / "cam1" / "sensor.yaml");
-  }
-  const fs::path truth = mav / "state_groundtruth_estimate0";
-  if (fs::exists(truth, ignored)) {
-    drive.local_reference = read_groundtruth(truth / "data.csv");
-    constexpr double kMotionCapture = 0.001;  // m, Burri et al. 2016, section 3.2: below a millimetre
-    drive.description.reference = {ReferenceOf::kImu, true, kMotionCapture};
-  }
-  return drive;
+  const bool is_above = is_there(folder / "mav0");
+  return MavImporter(is_above ? folder / "mav0" : folder, is_above ? folder : folder / "..").take();
 }
 
 }  // namespace roadfix

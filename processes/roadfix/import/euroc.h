@@ -1,4 +1,5 @@
-/// EuRoC MAV recordings: mav0 with imu0, cam0, cam1 and state_groundtruth_estimate0, each sensor.yaml and data.csv.
+/// EuRoC MAV recordings: mav0 with imu0, cam0, cam1 and state_groundtruth_estimate0, each sensor.yaml and data.csv; and
+/// TUM VI's: mocap0 in place of the ground truth, dso/camchain.yaml and dso/imu_config.yaml in place of sensor.yaml.
 #pragma once
 
 #include <filesystem>

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "config/config_error.h"
+#include "roadfix/import/comma2k19.h"
 #include "roadfix/import/drive_folder.h"
 #include "roadfix/import/euroc.h"
 #include "roadfix/import/imu_check.h"
@@ -41,6 +42,7 @@ const std::vector<Layout>& layouts() {
       {"euroc", "EuRoC", {{"mav0"}}, {}},
       {"euroc", "the inside of EuRoC's mav0", {{"imu0"}, {"cam0"}}, {"imu0", "cam0"}},
       {"kitti", "KITTI odometry", {{"calib.txt"}, {"image_0", "image_2"}}, {"calib.txt", "image_0", "image_2"}},
+      {"comma2k19", "a comma2k19 segment", {{"processed_log"}}, {"global_pose", "video.hevc"}},
       {"kitti_raw", "KITTI raw", {{"oxts"}}, {"image_00", "image_02"}},
       {"poses", "files of poses", {{"*_times.txt"}}, {"*_gt.txt"}},
   };
@@ -93,6 +95,7 @@ Drive read_format(const fs::path& source, const SourceOptions& options) {
   if (options.format == "folder") return read_drive_folder(source);
   if (options.format == "kitti") return read_kitti(source);
   if (options.format == "kitti_raw") return read_kitti_raw(source, options.gnss_from_oxts);
+  if (options.format == "comma2k19") return read_comma2k19(source);
   if (options.format == "euroc") return read_euroc(source);
   if (options.format == "rosbag") return read_rosbag(source, options.topics);
   return read_poses(source, {options.sequence, options.times, options.reference});

@@ -55,6 +55,31 @@ void write_small_euroc(const fs::path& folder) {
                    "1403715273262142976,1,2,3,0.5,-0.5,0.5,-0.5\n");
 }
 
+/// The same as TUM VI has it: no sensor.yaml, one chain of Kalibr, motion capture for ground truth.
+void write_small_tum_vi(const fs::path& folder) {
+  write_small_euroc(folder);
+  const fs::path mav = folder / "mav0";
+  fs::remove(mav / "imu0/sensor.yaml");
+  fs::remove(mav / "cam0/sensor.yaml");
+  fs::rename(mav / "state_groundtruth_estimate0", mav / "mocap0");
+  test::write_file(
+      mav / "mocap0/data.csv",
+      "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n"
+      "1403715273262142976,1,2,3,0.5,-0.5,0.5,-0.5\n1403715373262142976,1,2,3,0.5,-0.5,0.5,-0.5\n");
+  fs::copy(mav / "cam0", mav / "cam1", fs::copy_options::recursive);
+  fs::create_directories(folder / "dso");
+  const std::string lens =
+      "  camera_model: pinhole\n  distortion_model: equidistant\n  distortion_coeffs: [0.003, 0.0007, -0.002, 0.0002]\n"
+      "  intrinsics: [190.9, 190.9, 254.9, 256.8]\n  resolution: [8, 6]\n  rostopic: /cam0/image_raw\n";
+  test::write_file(folder / "dso/camchain.yaml",
+                   "cam0:\n  T_cam_imu: [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n" + lens +
+                       "cam1:\n  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n" + lens);
+  test::write_file(folder / "dso/imu_config.yaml",
+                   "rostopic: /imu0\nupdate_rate: 200.0\naccelerometer_noise_density: 0.0028\n"
+                   "accelerometer_random_walk: 0.00086\ngyroscope_noise_density: 0.00016\n"
+                   "gyroscope_random_walk: 0.000022\n");
+}
+
 void write_small_poses(const fs::path& folder) {
   test::write_file(folder / "a_times.txt", "0\n0.5\n1.0\n");
   test::write_file(folder / "a_reference.txt", kTwoPoses);
@@ -109,6 +134,30 @@ TEST_CASE("a EuRoC recording is read with its own axes") {
   CHECK(read(folder.path() / "mav0").imu.size() == 2);
 }
 
+TEST_CASE("a TUM VI recording is read with its fisheye lenses and motion capture") {
+  const test::TemporaryFolder folder;
+  write_small_tum_vi(folder.path());
+  const Drive drive = read(folder.path());
+  CHECK(drive.description.origin == "TUM VI recording");
+  CHECK(drive.imu.size() == 2);
+  CHECK(drive.frames_right.size() == 1);
+  const auto& sensors = drive.description.calibration.sensors;
+  CHECK(sensors.imu->rate == 200.0);
+  CHECK(sensors.imu->accel_noise == 0.0028);
+  CHECK(sensors.camera_left->model == CameraModel::kFisheye);
+  CHECK(sensors.camera_left->distortion->model == DistortionModel::kEquidistant);
+  CHECK(sensors.camera_left->distortion->coefficients[1] == 0.0007);
+  CHECK(sensors.camera_left->mounting->p.x() == -0.1);
+  CHECK(sensors.camera_right->mounting->p.x() == 0.0);
+  CHECK(drive.local_reference.size() == 2);
+  CHECK_THAT(fmt::format("{}", fmt::join(drive.remarks, "\n")), Catch::Contains("mocap0) has a gap of 100 s"));
+  // The chain names the right eye first: the pictures keep their folders, and each its own lens.
+  std::string chain = test::read_file(folder / "dso/camchain.yaml");
+  chain.replace(chain.find("0.1]"), 4, "-.1]");
+  test::write_file(folder / "dso/camchain.yaml", chain);
+  CHECK(read(folder.path()).description.calibration.sensors.camera_left->mounting->p.x() == 0.1);
+}
+
 TEST_CASE("poses of every kind of file are read") {
   const test::TemporaryFolder folder;
   write_small_poses(folder.path());
@@ -161,6 +210,12 @@ TEST_CASE("a broken file of each format gives the error a user needs") {
       {write_small_euroc, "mav0/cam0/sensor.yaml", "T_BS: {rows: 4, cols: 4, data: [1]}\n",
        "T_BS.data = a list: has 1 entries"},
       {write_small_euroc, "mav0/cam0/data/a.png", nullptr, "data.csv:2: filename = a.png: no such file in data/"},
+      {write_small_tum_vi, "dso/camchain.yaml", nullptr, "cam0/sensor.yaml: no such file, and no"},
+      {write_small_tum_vi, "dso/camchain.yaml", "cam0: {camera_model: omni}\n", "camchain.yaml"},
+      {write_small_tum_vi, "dso/imu_config.yaml", nullptr, "imu0/sensor.yaml: no such file"},
+      {write_small_tum_vi, "dso/imu_config.yaml", "update_rates: 1\n",
+       "update_rates is unknown, did you mean update_rate?"},
+      {write_small_tum_vi, "mav0/mocap0/data.csv", "#timestamp [ns],p\n1,2\n", "data.csv:1: column p is unknown"},
       {write_small_poses, "a_keyframes.txt", "7 1 0 0 0 0 1 0 0 0 0 1 0\n",
        "a_keyframes.txt:1: frame 7 has no time; there are 3"},
       {write_small_poses, "a_keyframes.txt", "2 1 0 0 0 0 1 0 0 0 0 1 0\n1 1 0 0 0 0 1 0 0 0 0 1 0\n",
