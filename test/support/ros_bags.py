@@ -3,6 +3,7 @@
 Everything here is written from the formats' documentation, apart from what the importer reads by: a bag that both agree on is right
 twice. Vectors go into the axes of REP 103, which are ours."""
 import bz2
+import ctypes
 import sqlite3
 import struct
 import zlib
@@ -36,11 +37,16 @@ DEFINITIONS = {
     "std_msgs/String": "string data",
 }
 HEADER = {1: "uint32 seq\ntime stamp\nstring frame_id", 2: "builtin_interfaces/Time stamp\nstring frame_id"}
-NUMBERS = {"int8": "b", "uint8": "B", "uint16": "H", "uint32": "I", "float64": "d"}
+NUMBERS = {"int8": "b", "uint8": "B", "bool": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float64": "d"}
+
+
+def text_of(kind, version):
+    """The .msg text of one type; ROS 2 renamed fields of some."""
+    return HEADER[version] if kind == "std_msgs/Header" else DEFINITIONS.get((kind, version)) or DEFINITIONS[kind]
 
 
 def fields(kind, version):
-    text = HEADER[version] if kind == "std_msgs/Header" else DEFINITIONS[kind]
+    text = text_of(kind, version)
     return [line.split() for line in text.split("\n") if "=" not in line]
 
 
@@ -52,8 +58,7 @@ def definition(kind, version):
         if part not in seen:
             seen.append(part)
             parts += [t.split("[")[0] for t, _ in fields(part, version) if "/" in t and "builtin" not in t]
-    text = lambda part: HEADER[version] if part == "std_msgs/Header" else DEFINITIONS[part]
-    return text(kind) + "\n" + "".join(f"{'=' * 80}\nMSG: {part}\n{text(part)}\n" for part in seen[1:])
+    return text_of(kind, version) + "\n" + "".join(f"{'=' * 80}\nMSG: {part}\n{text_of(part, version)}\n" for part in seen[1:])
 
 
 class Encoder:
@@ -80,7 +85,7 @@ class Encoder:
             if size == "]":
                 self.pack("I", len(value))
             if base == "uint8":
-                self.out += value
+                self.out += bytes(value)
             else:
                 for one in value:
                     self.value(base, one)
@@ -208,6 +213,23 @@ def equal_values(expected, found):
     return equal, total
 
 
+def pack(compression, data):
+    """By the packers' own libraries, which the programs need anyway; Debian's Python has lz4 and zstd in packages alone."""
+    if compression in ("", "none"):
+        return data
+    if compression == "bz2":
+        return bz2.compress(data)
+    out = ctypes.create_string_buffer(len(data) + 65536)
+    if compression == "zstd":
+        call, more = ctypes.CDLL("libzstd.so.1").ZSTD_compress, (ctypes.c_int(3),)
+    else:
+        call, more = ctypes.CDLL("liblz4.so.1").LZ4F_compressFrame, (None,)
+    call.restype = ctypes.c_size_t
+    size = call(out, ctypes.c_size_t(len(out)), data, ctypes.c_size_t(len(data)), *more)
+    assert 0 < size <= len(out), f"{compression} failed"
+    return out.raw[:size]
+
+
 def connections(stream):
     return list(dict.fromkeys((topic, kind) for topic, kind, _, _ in stream))
 
@@ -243,7 +265,7 @@ def write_ros1(path, stream, compression="none"):
                 told.add(i)
             counts[i] = counts.get(i, 0) + 1
             chunk += record(encode(kind, value, 1), op=b"\2", conn=number("I", i), time=stamp(t))
-        packed = bz2.compress(bytes(chunk)) if compression == "bz2" else bytes(chunk)
+        packed = pack(compression, bytes(chunk))
         times = [t for _, _, t, _ in stream[begin:begin + 400]]
         infos.append(record(b"".join(number("I", i) + number("I", n) for i, n in counts.items()), op=b"\6", ver=number("I", 1),
                             chunk_pos=number("Q", start + len(body)), start_time=stamp(min(times)), end_time=stamp(max(times)),
@@ -306,7 +328,7 @@ def write_sqlite(folder, stream):
     write_metadata(folder, path.name, "sqlite3", len(stream))
 
 
-def write_mcap(folder, stream):
+def write_mcap(folder, stream, compression=""):
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "drive_0.mcap"
     magic, text = b"\x89MCAP0\r\n", lambda s: struct.pack("<I", len(s)) + s.encode()
@@ -323,8 +345,9 @@ def write_mcap(folder, stream):
         for topic, kind, t, value in part:
             chunk += record(5, struct.pack("<HIQQ", topics.index((topic, kind)), 0, t, t) + encode(kind, value, 2))
         times = [t for _, _, t, _ in part]
-        out += record(6, struct.pack("<QQQI", min(times), max(times), len(chunk), zlib.crc32(chunk)) + text("")
-                      + struct.pack("<Q", len(chunk)) + bytes(chunk))
+        packed = pack(compression, bytes(chunk))
+        out += record(6, struct.pack("<QQQI", min(times), max(times), len(chunk), zlib.crc32(chunk)) + text(compression)
+                      + struct.pack("<Q", len(packed)) + packed)
     out += record(15, struct.pack("<I", 0)) + record(2, struct.pack("<QQI", 0, 0, 0)) + magic
     path.write_bytes(out)
     write_metadata(folder, path.name, "mcap", len(stream))

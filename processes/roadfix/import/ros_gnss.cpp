@@ -1,5 +1,6 @@
 // Fixes of the receivers' drivers that ROS knows, each type with its own units.
 #include <cmath>
+#include <map>
 
 #include "geometry/frames.h"
 #include "roadfix/import/ros_topic.h"
@@ -53,11 +54,12 @@ void RosTopic::take_nav_sat_fix(int64_t t_us) {
 void RosTopic::take_gps_fix(int64_t t_us) {
   GnssFix fix;
   fix.t_us = t_us;
-  const double status = number("status.status");  // as NavSatStatus, and 18 SBAS, 19 GBAS, 33 WAAS of older drivers
-  fix.fix_type = status < 0.0    ? FixType::kNone
-                 : status == 0.0 ? FixType::kSingle
-                 : status == 2.0 ? FixType::kRtkFixed
-                                 : FixType::kDifferential;
+  // As NavSatStatus, and 18 DGPS, 19 RTK fixed, 20 RTK float, 33 WAAS.
+  static const std::map<int, FixType> kTypes = {
+      {0, FixType::kSingle}, {2, FixType::kRtkFixed}, {19, FixType::kRtkFixed}, {20, FixType::kRtkFloat}};
+  const int status = static_cast<int>(number("status.status"));
+  const auto type = kTypes.find(status);
+  fix.fix_type = status < 0 ? FixType::kNone : type == kTypes.end() ? FixType::kDifferential : type->second;
   fix.height_kind = HeightKind::kUnknown;  // "above reference (e.g., sea level)"
   fix.antenna = {number("latitude") * kDegree, number("longitude") * kDegree, number("altitude")};
   if (number("position_covariance_type") > 0.0) fix.cov_enu = matrix("position_covariance", 3);
@@ -97,13 +99,16 @@ void RosTopic::take_gps_raw(int64_t t_us) {
   add_fix(fix);
 }
 
-/// u-blox UBX-NAV-PVT: 1e-7 deg, mm, mm/s.
+/// u-blox UBX-NAV-PVT: 1e-7 deg, mm, mm/s. ROS 2 calls fix_type what ROS 1 called fixType, and so on.
 void RosTopic::take_nav_pvt(int64_t t_us) {
+  const bool ros2 = has("fix_type");
+  const auto field = [&](const char* ros1_name, const char* ros2_name) { return number(ros2 ? ros2_name : ros1_name); };
   GnssFix fix;
   fix.t_us = t_us;
   const auto flags = static_cast<unsigned>(number("flags"));
-  const double type = number("fixType");  // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 with dead reckoning, 5 time alone
-  const unsigned carrier = flags >> 6U;   // 1 float, 2 fixed
+  // 0 none, 1 dead reckoning, 2 2D, 3 3D, 4 with dead reckoning, 5 time alone
+  const double type = field("fixType", "fix_type");
+  const unsigned carrier = flags >> 6U;  // 1 float, 2 fixed
   fix.fix_type = type == 0.0 || type == 5.0 || (flags & 1U) == 0 ? FixType::kNone
                  : type == 1.0                                   ? FixType::kDeadReckoning
                  : carrier == 2                                  ? FixType::kRtkFixed
@@ -112,13 +117,14 @@ void RosTopic::take_nav_pvt(int64_t t_us) {
                                                                  : FixType::kSingle;
   fix.height_kind = HeightKind::kEllipsoid;
   fix.antenna = {number("lat") * 1e-7 * kDegree, number("lon") * 1e-7 * kDegree, number("height") * 1e-3};
-  const double h = number("hAcc") * 1e-3 / std::sqrt(2.0);  // hAcc is of the distance, each axis has its part
-  fix.cov_enu = diagonal(h, h, number("vAcc") * 1e-3);
-  const Eigen::Vector3d enu(number("velE"), number("velN"), -number("velD"));
-  const double sigma = number("sAcc") * 1e-3;
+  // The accuracy is of the distance, each axis has its part.
+  const double h = field("hAcc", "h_acc") * 1e-3 / std::sqrt(2.0);
+  fix.cov_enu = diagonal(h, h, field("vAcc", "v_acc") * 1e-3);
+  const Eigen::Vector3d enu(field("velE", "vel_e"), field("velN", "vel_n"), -field("velD", "vel_d"));
+  const double sigma = field("sAcc", "s_acc") * 1e-3;
   fix.velocity = GnssVelocity{enu * 1e-3, Eigen::Matrix3d::Identity() * sigma * sigma};
-  fix.num_satellites = static_cast<int>(number("numSV"));
-  fix.pdop = number("pDOP") * 0.01;
+  fix.num_satellites = static_cast<int>(field("numSV", "num_sv"));
+  fix.pdop = field("pDOP", "p_dop") * 0.01;
   add_fix(fix);
 }
 
