@@ -9,6 +9,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "config/config_error.h"
+#include "cut_files.h"
 #include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "roadfix/import/image_header.h"
@@ -261,6 +262,16 @@ TEST_CASE("an array that is cut anywhere is an error with file and offset") {
   for (std::size_t n = 0; n < whole.size(); ++n) {
     CHECK_THROWS_WITH(parse(whole.substr(0, n)), Catch::StartsWith("a.npy: at offset "));
   }
+}
+
+TEST_CASE("comma2k19: files that are cut anywhere are refused, and leave nothing") {
+  const test::TemporaryFolder folder;
+  write_segment(folder / "s");
+  fs::remove_all(folder / "s/processed_log/GNSS/live_gnss_qcom");  // is not read beside the other receiver
+  const test::Cuts cuts = test::cut_every_file(folder.path(), folder / "s");
+  INFO(fmt::format("{} taken\n{}", cuts.taken, fmt::join(cuts.complaints, "\n")));
+  CHECK(cuts.complaints.empty());
+  CHECK(cuts.taken == 0);
 }
 
 }  // namespace

@@ -1,9 +1,11 @@
 // Drive folders: every file is read, and a broken copy of each file gives the error a user needs.
 #include "roadfix/import/drive_folder.h"
 
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 
 #include "config/config_error.h"
+#include "cut_files.h"
 #include "geometry/frames.h"
 #include "roadfix/import/csv_reader.h"
 #include "small_drive.h"
@@ -212,6 +214,15 @@ TEST_CASE("garbage in place of a file is refused and never crashes") {
       CHECK_NOTHROW(error_of(folder.path()));
     }
   }
+}
+
+TEST_CASE("a drive folder whose files are cut anywhere is refused with the file, and leaves nothing") {
+  const test::TemporaryFolder folder;
+  test::write_small_drive(folder.path());
+  const test::Cuts cuts = test::cut_every_file(folder.path(), folder.path());
+  INFO(fmt::format("{} taken\n{}", cuts.taken, fmt::join(cuts.complaints, "\n")));
+  CHECK(cuts.complaints.empty());
+  CHECK(cuts.refused > 60);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "config/config_error.h"
+#include "cut_files.h"
 #include "geometry/frames.h"
 #include "roadfix/import/kitti_calib.h"
 #include "roadfix/import/kitti_oxts.h"
@@ -31,7 +32,7 @@ void write_calib(const fs::path& folder) {
   test::write_file(folder / "calib_imu_to_velo.txt",
                    "calib_time: 25-May-2012 16:47:16\nR: 1 0 0 0 1 0 0 0 1\nT: -0.8 0.3 -0.8\n");
   test::write_file(folder / "calib_velo_to_cam.txt",
-                   "calib_time: 15-Mar-2012 11:37:16\nR: 0 -1 0 0 0 -1 1 0 0\nT: 0 -0.1 -0.3\ndelta_f: 0 0\n");
+                   "calib_time: 15-Mar-2012 11:37:16\nR: 0 -1 0 0 0 -1 1 0 0\nT: 0 -0.1 -0.3\n");
   test::write_file(folder / "calib_cam_to_cam.txt",
                    "calib_time: 09-Jan-2012 13:57:47\ncorner_dist: 9.95e-02\n"
                    "S_00: 10 8\nK_00: 720 0 5 0 721 4 0 0 1\nD_00: -0.37 0.2 0.001 0.002 -0.07\n"
@@ -209,6 +210,15 @@ TEST_CASE("a folder with pictures of KITTI raw but without oxts is named as that
   fs::create_directories(folder / "image_00");
   CHECK_THROWS_WITH(detect_format(folder.path()),
                     Catch::Contains("looks like KITTI raw, as image_00 is there, but oxts is missing"));
+}
+
+TEST_CASE("KITTI raw: files that are cut anywhere are refused, and leave nothing") {
+  const test::TemporaryFolder folder;
+  write_raw(folder / "drive");
+  const test::Cuts cuts = test::cut_every_file(folder.path(), folder / "drive");
+  INFO(fmt::format("{} taken\n{}", cuts.taken, fmt::join(cuts.complaints, "\n")));
+  CHECK(cuts.complaints.empty());
+  CHECK(cuts.refused > 100);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "config/config_error.h"
+#include "cut_files.h"
 #include "geometry/so3.h"
 #include "roadfix/import/image_header.h"
 #include "roadfix/import/pose_files.h"
@@ -294,6 +295,17 @@ TEST_CASE("a picture whose end is missing is known as that, wherever it ends") {
     const std::string with = file.substr(0, 2) + thumbnail + file.substr(2);
     CHECK(has_end(with, kind));
     CHECK_FALSE(has_end(with.substr(0, with.size() / 2), kind));
+  }
+}
+
+TEST_CASE("recordings whose files are cut anywhere are refused with the file, and leave nothing") {
+  for (const auto write : {write_small_kitti, write_small_euroc, write_small_tum_vi, write_small_poses}) {
+    const test::TemporaryFolder folder;
+    write(folder.path());
+    const test::Cuts cuts = test::cut_every_file(folder.path(), folder.path());
+    INFO(fmt::format("{} taken\n{}", cuts.taken, fmt::join(cuts.complaints, "\n")));
+    CHECK(cuts.complaints.empty());
+    CHECK(cuts.refused > 20);
   }
 }
 
