@@ -1,4 +1,5 @@
-/// A neural network from an ONNX file, run by OpenCV's DNN on the processor.
+/// A neural network from an ONNX file, run by OpenCV's DNN on the processor: the one engine, as Debian 12 packages no
+/// ONNX Runtime.
 #pragma once
 
 #include <opencv2/dnn.hpp>

@@ -1,4 +1,4 @@
-/// Reads a drive folder: drive.yaml, CSV files plain or gzip, pictures. README, section "Own data".
+/// Reads a drive folder: drive.yaml, CSV files plain or gzip, pictures. docs/IMPORT.md.
 #pragma once
 
 #include <filesystem>
