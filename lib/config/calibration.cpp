@@ -20,7 +20,7 @@ constexpr double kMaxPixels = 20000.0;
 // Standard deviations of a place seen from the IMU: about as far as it may be, and what a tape measure leaves.
 const Eigen::Vector3d kUnknownAxle_m(1.0, 0.5, 0.5);
 const Eigen::Vector3d kUnknownAntenna_m(1.0, 0.5, 1.0);
-constexpr double kTapeMeasure_m = 0.05;
+constexpr double kDefaultLeverArmStd_m = 0.05;
 
 }  // namespace
 
@@ -169,7 +169,7 @@ PlaceOnVehicle Calibration::rear_axle() const {
   if (body_origin == BodyOrigin::kRearAxle) place.std.setZero();
   if (sensors.wheels && sensors.wheels->lever_arm) {
     place.p = *sensors.wheels->lever_arm;
-    place.std.setConstant(sensors.wheels->lever_arm_std.value_or(kTapeMeasure_m));
+    place.std.setConstant(sensors.wheels->lever_arm_std.value_or(kDefaultLeverArmStd_m));
   }
   return place;
 }

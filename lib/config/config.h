@@ -1,4 +1,4 @@
-/// Strict YAML configuration, both ways. A struct with in-class defaults says its keys once, in a visit() found by
+/// Strict YAML configuration, both ways. A struct with in-class defaults lists its keys once, in a visit() found by
 /// argument-dependent lookup; units are part of the keys, and the library that owns the struct needs no YAML:
 ///
 /// ```
@@ -37,7 +37,7 @@
 
 namespace roadfix {
 
-/// `config` with what `text` says; `file` is what errors call it.
+/// `config` with the values of `text`; `file` is what errors call it.
 template <class T>
 T parse_config(const std::string& text, const std::string& file, T config = T{}) {
   const YamlNode root = parse_yaml_tree(text, file);

@@ -1,4 +1,4 @@
-/// What a user reads when a file is wrong: always the file, where it can be told the line, and what is wrong there.
+/// What a user reads when a file is wrong: always the file, the line where it is known, and what is wrong there.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-/// The cameras of a Kalibr camera chain (camchain.yaml, camchain-imucam.yaml) as a calibration says them. Formats:
+/// The cameras of a Kalibr camera chain (camchain.yaml, camchain-imucam.yaml) as a calibration holds them. Formats:
 /// https://github.com/ethz-asl/kalibr/wiki/yaml-formats. Intrinsics, distortion coefficients and the time shift mean
 /// the same in both; Kalibr's T_cam_imu takes coordinates of the imu to the camera, T_body_camera the other way.
 #pragma once

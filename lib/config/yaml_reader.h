@@ -93,7 +93,7 @@ class YamlReader {
 
   /// Without this key nothing works. Say it before or after the key itself.
   void require(const char* key);
-  /// A condition that no range can say, on a key already read: `what` completes "KEY = VALUE: ...".
+  /// A condition that is not a range, on a key already read: `what` completes "KEY = VALUE: ...".
   void check(const char* key, bool ok, const std::string& what);
 
   void finish() const;

@@ -16,21 +16,21 @@ void YamlWriter::boolean(const char* key, const bool& value) { line(key, value ?
 void YamlWriter::text(const char* key, const std::string& value) { line(key, yaml_scalar(value)); }
 
 void YamlWriter::numbers(const char* key, const std::vector<double>& values, double, double) {
-  std::vector<std::string> words;
-  for (const double value : values) words.push_back(to_text(value));
-  list_line(key, words);
+  std::vector<std::string> texts;
+  for (const double value : values) texts.push_back(to_text(value));
+  list_line(key, texts);
 }
 
 void YamlWriter::integers(const char* key, const std::vector<int64_t>& values, int64_t, int64_t) {
-  std::vector<std::string> words;
-  for (const int64_t value : values) words.push_back(std::to_string(value));
-  list_line(key, words);
+  std::vector<std::string> texts;
+  for (const int64_t value : values) texts.push_back(std::to_string(value));
+  list_line(key, texts);
 }
 
 void YamlWriter::texts(const char* key, const std::vector<std::string>& values) {
-  std::vector<std::string> words;
-  for (const std::string& value : values) words.push_back(yaml_scalar(value));
-  list_line(key, words);
+  std::vector<std::string> texts;
+  for (const std::string& value : values) texts.push_back(yaml_scalar(value));
+  list_line(key, texts);
 }
 
 std::string YamlWriter::text() const {

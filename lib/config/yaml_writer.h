@@ -68,9 +68,9 @@ class YamlWriter {
   void texts(const char* key, const std::vector<std::string>& values);
   template <class E>
   void choices(const char* key, const std::vector<E>& values, ChoiceNames<E> names) {
-    std::vector<std::string> words;
-    for (const E& value : values) words.push_back(name_of<E>(value, names));
-    list_line(key, words, alternatives_text<E>(values, names));
+    std::vector<std::string> texts;
+    for (const E& value : values) texts.push_back(name_of<E>(value, names));
+    list_line(key, texts, alternatives_text<E>(values, names));
   }
   template <class T>
   void groups(const char* key, std::vector<T>& values) {

@@ -7,7 +7,7 @@
 namespace roadfix {
 namespace {
 
-/// cos(pitch) below which roll and yaw are no longer told apart: 1e-9 rad from the pole, where their difference is lost
+/// cos(pitch) below which roll and yaw are not distinguished: 1e-9 rad from the pole, where their difference is lost
 /// to rounding.
 constexpr double kGimbalLock = 1e-9;
 

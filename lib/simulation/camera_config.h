@@ -1,4 +1,4 @@
-/// The simulated cameras and the street that they see, as a scenario says it (scenario_config.h). Which pictures are
+/// The simulated cameras and the street that they see, as a scenario defines it (scenario_config.h). Which pictures are
 /// taken and when is decided in lib/simulation; lib/simulation/scene draws them.
 #pragma once
 
@@ -68,7 +68,7 @@ struct SceneConfig {
 
 CameraIntrinsics intrinsics_of(const CameraConfig& config);
 
-/// Where the calibration says that the left camera is.
+/// Place of the left camera by the calibration.
 SE3 nominal_T_vehicle_left(const CameraConfig& config);
 /// The right camera in the left one's axes.
 SE3 T_left_right(const CameraConfig& config);

@@ -11,7 +11,7 @@ namespace {
 std::int64_t microseconds(double seconds) { return static_cast<std::int64_t>(std::llround(seconds * 1e6)); }
 
 /// What happens to one message; every effect starts as none.
-struct Fate {
+struct LinkEffects {
   bool silent = false;
   bool lost = false;
   bool repeated = false;
@@ -21,30 +21,30 @@ struct Fate {
   double repeat_delay_s = 0.0;
 };
 
-void apply(ActiveFault& fault, Fate& fate) {
+void apply(ActiveFault& fault, LinkEffects& effects) {
   constexpr double kRepeatDelay = 0.02;  // s, longest
   switch (fault->kind) {
     case FaultKind::kSilence:
-      fate.silent = true;
+      effects.silent = true;
       break;
     case FaultKind::kDrop:
-      fate.lost = fate.lost || fault.random.uniform() < fault->get("probability");
+      effects.lost = effects.lost || fault.random.uniform() < fault->get("probability");
       break;
     case FaultKind::kRepeat:
-      fate.repeated = fate.repeated || fault.random.uniform() < fault->get("probability");
-      fate.repeat_delay_s = kRepeatDelay * fault.random.uniform();
+      effects.repeated = effects.repeated || fault.random.uniform() < fault->get("probability");
+      effects.repeat_delay_s = kRepeatDelay * fault.random.uniform();
       break;
     case FaultKind::kStuck:
-      fate.stuck = true;
+      effects.stuck = true;
       break;
     case FaultKind::kClock:
-      fate.stamp_error_s += fault->get("offset_s");
+      effects.stamp_error_s += fault->get("offset_s");
       break;
     case FaultKind::kJitter:
-      fate.stamp_error_s += fault->get("sigma_s") * fault.random.normal();
+      effects.stamp_error_s += fault->get("sigma_s") * fault.random.normal();
       break;
     case FaultKind::kDelay:
-      fate.delay_s += fault->get("delay_s") + fault->get("jitter_s") * fault.random.uniform();
+      effects.delay_s += fault->get("delay_s") + fault->get("jitter_s") * fault.random.uniform();
       break;
     default:  // the sensor's own faults are in its samples already
       break;
@@ -53,36 +53,36 @@ void apply(ActiveFault& fault, Fate& fate) {
 
 }  // namespace
 
-std::vector<Passage> pass(const SimulatedDrive& drive, Sensor sensor, const LinkConfig& link,
-                          const std::vector<std::int64_t>& true_times, const char* part) {
+std::vector<Transmission> transmit(const SimulatedDrive& drive, Sensor sensor, const LinkConfig& link,
+                                   const std::vector<std::int64_t>& true_times, const char* part) {
   RandomStream random = stream_of(drive, NoiseStream::kLink, static_cast<std::uint64_t>(sensor));
   FaultSet faults(drive, sensor, part);
-  std::vector<Passage> passages;
-  passages.reserve(true_times.size());
+  std::vector<Transmission> transmissions;
+  transmissions.reserve(true_times.size());
   std::int64_t seq = 0;
   std::size_t moving = 0;  // newest sample that was not stuck
   for (std::size_t i = 0; i < true_times.size(); ++i) {
     const double t_s = seconds_between(drive.config.start_utime, true_times[i]);
-    Fate fate;
-    fate.lost = random.uniform() < link.drop_probability;
-    fate.stamp_error_s =
+    LinkEffects effects;
+    effects.lost = random.uniform() < link.drop_probability;
+    effects.stamp_error_s =
         link.clock_offset_s + 1e-6 * link.clock_drift_ppm * t_s + link.stamp_jitter_s * random.normal();
-    fate.delay_s = link.delay_s + link.delay_jitter_s * random.uniform();
-    faults.for_each(t_s, [&](ActiveFault& f) { apply(f, fate); });
-    if (!fate.stuck) moving = i;
-    if (fate.silent) continue;
-    Passage p;
-    p.measured = i;
-    p.payload = moving;
-    p.stamp_us = true_times[i] + microseconds(fate.stamp_error_s);
-    p.delivery = {seq++, true_times[i], true_times[i] + microseconds(fate.delay_s)};
-    if (fate.lost) continue;
-    passages.push_back(p);
-    if (!fate.repeated) continue;
-    p.delivery.arrival_us += microseconds(fate.repeat_delay_s);
-    passages.push_back(p);
+    effects.delay_s = link.delay_s + link.delay_jitter_s * random.uniform();
+    faults.for_each(t_s, [&](ActiveFault& f) { apply(f, effects); });
+    if (!effects.stuck) moving = i;
+    if (effects.silent) continue;
+    Transmission transmission;
+    transmission.measured = i;
+    transmission.payload = moving;
+    transmission.stamp_us = true_times[i] + microseconds(effects.stamp_error_s);
+    transmission.delivery = {seq++, true_times[i], true_times[i] + microseconds(effects.delay_s)};
+    if (effects.lost) continue;
+    transmissions.push_back(transmission);
+    if (!effects.repeated) continue;
+    transmission.delivery.arrival_us += microseconds(effects.repeat_delay_s);
+    transmissions.push_back(transmission);
   }
-  return passages;
+  return transmissions;
 }
 
 }  // namespace roadfix

@@ -6,7 +6,7 @@
 namespace roadfix {
 namespace {
 
-// ISO 8608:2016: reference wave number and the range that its classes are said for, cycles per metre.
+// ISO 8608:2016: reference wave number and the range that its classes are defined for, cycles per metre.
 constexpr double kReference = 0.1;
 constexpr double kLongest = 0.011;
 constexpr int kOctaves = 8;  // up to 2.8 cycles per metre
@@ -42,7 +42,7 @@ RoughRoad::RoughRoad(double roughness_m3, double wheelbase, double track_width, 
   }
 }
 
-Ride RoughRoad::at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const {
+BodyMotion RoughRoad::at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const {
   const Eigen::Vector2d forward(std::cos(heading), std::sin(heading));
   const Eigen::Vector2d left(-forward.y(), forward.x());
   double rear = 0.0, front = 0.0, lean = 0.0;

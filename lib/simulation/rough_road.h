@@ -13,7 +13,7 @@
 namespace roadfix {
 
 /// The body against a smooth road; pitch and roll as geometry/euler.h.
-struct Ride {
+struct BodyMotion {
   double heave = 0.0;  ///< m, up, of the rear axle's centre
   double pitch = 0.0;  ///< rad, nose down
   double roll = 0.0;   ///< rad, right side down
@@ -25,7 +25,7 @@ class RoughRoad {
   RoughRoad(double roughness_m3, double wheelbase, double track_width, RandomStream random);
 
   /// place: of the rear axle's centre, enu; heading: rad, counterclockwise from east; velocity: m/s, enu.
-  [[nodiscard]] Ride at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const;
+  [[nodiscard]] BodyMotion at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const;
 
  private:
   struct Wave {

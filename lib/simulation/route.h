@@ -48,7 +48,7 @@ double turn_rate(double x);
 /// Throws std::invalid_argument where turns overlap or a direction changes without a stop.
 Path path_through(const std::vector<WayPoint>& points);
 
-/// Distance travelled at times 0, step_s, ... duration_s: as fast as the limits let it, stopping where told, then
+/// Distance travelled at times 0, step_s, ... duration_s: within the limits, stopping where stop_s is set, then
 /// smoothed. Where the path ends before the time, the vehicle stands at its end.
 std::vector<double> travelled(const Path& path, const Limits& limits, double start_speed, double step_s, int count);
 

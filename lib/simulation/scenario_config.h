@@ -69,7 +69,7 @@ struct GnssConfig {
   double sigma_velocity_mps = 0.03;                ///< white, each axis; zero: the receiver gives no velocity
   double sigma_heading_rad = 0.0;                  ///< white, of a dual-antenna heading; zero: one antenna
   double claimed_sigma_factor = 1.0;               ///< of the claimed sigma, over the true one
-  Eigen::Vector3d lever_arm_m = {-0.3, 0.0, 1.4};  ///< antenna in the vehicle, as the calibration says
+  Eigen::Vector3d lever_arm_m = {-0.3, 0.0, 1.4};  ///< antenna in the vehicle, as in the calibration
   double lever_arm_std_m = 0.0;                    ///< true lever arm about it, each axis
   double position_latency_s = 0.0;                 ///< the position stamped t is of t minus this
   double velocity_latency_s = 0.0;
@@ -101,7 +101,7 @@ struct MagConfig {
   double inclination_deg = 64.0;  ///< downward
   double declination_deg = 3.5;   ///< east of true north
   double noise_ut = 0.3;
-  Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();  ///< as the calibration says
+  Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();  ///< as in the calibration
   double hard_iron_std_ut = 0.5;                           ///< true one about it, each axis
   double soft_iron_std = 0.005;                            ///< each element about the identity
   LinkConfig link = {.delay_s = 0.01, .delay_jitter_s = 0.005};

@@ -37,7 +37,7 @@ enum class NoiseStream : std::uint64_t {
   kRoad = 26,
 };
 
-/// `instance` tells sources of one kind apart, below 2^56.
+/// `instance` distinguishes sources of one kind, below 2^56.
 inline RandomStream stream_of(const SimulatedDrive& drive, NoiseStream stream, std::uint64_t instance = 0) {
   return {drive.seed, static_cast<std::uint64_t>(stream) + (instance << 8U)};
 }

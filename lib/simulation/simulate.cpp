@@ -55,7 +55,7 @@ Motion drive_route(const SimulatedDrive& drive) {
     const double yaw_rate = (poses[b].z() - poses[a].z()) / (2.0 * kKnot_s);
     PoseCoordinates x = coordinates(poses[i], acceleration, speed * yaw_rate, direction, c);
     const Eigen::Vector2d velocity = (poses[b] - poses[a]).head<2>() / (2.0 * kKnot_s);
-    const Ride ride = road.at(poses[i].head<2>(), x(3), velocity);
+    const BodyMotion ride = road.at(poses[i].head<2>(), x(3), velocity);
     x.tail<4>() += Eigen::Vector4d(ride.heave, 0.0, ride.pitch, ride.roll);
     samples.push_back(x);
   }

@@ -35,7 +35,7 @@ struct GnssError {
   double heading = 0.0;                                ///< rad
 };
 
-/// What faults do to one picture besides its way to the log.
+/// What faults do to one picture besides its transmission.
 struct PictureEffects {
   double light_factor = 1.0;     ///< on the light that falls in
   double glare = 0.0;            ///< light added, in shares of full scale
@@ -53,7 +53,7 @@ struct Picture {
 
 /// How the sample with the same index came about and reached the log.
 struct Delivery {
-  std::int64_t seq = 0;         ///< counts what the sensor sent: a message lost on the way leaves a gap
+  std::int64_t seq = 0;         ///< counts what the sensor sent: a message lost in transmission leaves a gap
   std::int64_t true_us = 0;     ///< when it was measured; its stamp may differ
   std::int64_t arrival_us = 0;  ///< when it was received
 };
@@ -77,7 +77,7 @@ struct SimulationErrors {
 };
 
 struct SimulatedDrive {
-  ScenarioConfig config;  ///< what a calibration would know: nominal values and their sigmas
+  ScenarioConfig config;  ///< what a calibration would hold: nominal values and their sigmas
   std::uint64_t seed = 0;
   EnuAnchor anchor{Geodetic{}};
   std::shared_ptr<const Motion> motion;

@@ -24,7 +24,7 @@ struct AxleSpeed {
 /// Nothing where a speed is no number or no car's (above 100 m/s).
 std::optional<AxleSpeed> axle_speed(const WheelSample& wheels, const WheelFacts& facts);
 
-/// The signed speed, where the sample's direction or a predicted speed tells the sign; nothing where neither does.
+/// The signed speed, where the sample's direction or a predicted speed gives the sign; nothing where neither does.
 /// `predicted` counts above kSignKnown.
 inline constexpr double kSignKnown = 0.3;  ///< m/s
 std::optional<double> signed_speed(const AxleSpeed& s, double predicted);

@@ -7,7 +7,7 @@
 
 namespace roadfix {
 
-struct Look {
+struct Appearance {
   Material material = Material::kConcrete;
   Pattern pattern = Pattern::kNone;
   float tint = 1.0F;
@@ -16,7 +16,7 @@ struct Look {
 };
 
 /// Offset to the left of the driven line and height above it.
-struct Rail {
+struct RibbonEdge {
   double t, z;
 };
 
@@ -48,11 +48,12 @@ class WorldBuilder {
 
   /// A parallelogram from `corner` along a and b; texture coordinates from st by the edges' lengths.
   void rectangle(const Station& near, const Eigen::Vector3d& corner, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                 const Look& look, const Eigen::Vector2d& st = Eigen::Vector2d::Zero());
+                 const Appearance& look, const Eigen::Vector2d& st = Eigen::Vector2d::Zero());
   /// Upright on T's origin (the middle of its floor), size along T's axes. No floor.
-  void box(const Station& near, const SE3& T_enu_box, const Eigen::Vector3d& size, const Look& side, const Look& top);
+  void box(const Station& near, const SE3& T_enu_box, const Eigen::Vector3d& size, const Appearance& side,
+           const Appearance& top);
   /// A strip between two rails over stations [first, last], cut where it bends and every `step` stations.
-  void ribbon(int first, int last, int step, Rail a, Rail b, const Look& look);
+  void ribbon(int first, int last, int step, RibbonEdge a, RibbonEdge b, const Appearance& look);
 
  private:
   void add(Face face);

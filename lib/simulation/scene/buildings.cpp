@@ -47,26 +47,26 @@ struct Wall {
   double height;
 };
 
-void add_wall(WorldBuilder& b, const Station& at, const Wall& w, const Look& look, double bay, bool shops) {
+void add_wall(WorldBuilder& b, const Station& at, const Wall& w, const Appearance& look, double bay, bool shops) {
   const double width = w.along.norm();
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   const auto bays = [&](double size) { return static_cast<float>(width / std::max(1.0, std::round(width / size))); };
-  Look floor = look;
+  Appearance floor = look;
   floor.pattern = Pattern::kWindows;
   floor.pattern_s = bays(shops ? 3.4 : bay);
   floor.pattern_t = static_cast<float>(kGroundFloor_m);
   floor.tint *= 0.85F;
   b.rectangle(at, w.corner - 2.0 * up, w.along, (2.0 + kGroundFloor_m) * up, floor, {0.0, -2.0});
-  Look upper = look;
+  Appearance upper = look;
   upper.pattern = Pattern::kWindows;
   upper.pattern_s = bays(bay);
   upper.pattern_t = static_cast<float>(kStorey_m);
   b.rectangle(at, w.corner + kGroundFloor_m * up, w.along, (w.height - kGroundFloor_m) * up, upper);
 }
 
-void add_roof(WorldBuilder& b, const Station& at, const SE3& T, const Eigen::Vector3d& size, const Look& wall,
+void add_roof(WorldBuilder& b, const Station& at, const SE3& T, const Eigen::Vector3d& size, const Appearance& wall,
               bool gable) {
-  const Look tiles{Material::kRoof, Pattern::kCourses, wall.tint, 0.5F, 0.35F};
+  const Appearance tiles{Material::kRoof, Pattern::kCourses, wall.tint, 0.5F, 0.35F};
   const Eigen::Vector3d x = T.q * Eigen::Vector3d(size.x(), 0, 0);
   const Eigen::Vector3d y = T.q * Eigen::Vector3d(0, size.y(), 0);
   const Eigen::Vector3d eaves = T * Eigen::Vector3d(-0.5 * size.x(), -0.5 * size.y(), size.z());
@@ -80,7 +80,7 @@ void add_roof(WorldBuilder& b, const Station& at, const SE3& T, const Eigen::Vec
   b.rectangle(at, eaves - 0.06 * ridge, x, 1.06 * ridge, tiles);
   b.rectangle(at, eaves + y + x - 0.06 * (ridge - y), -x, 1.06 * (ridge - y), tiles);
   for (const auto& foot : {eaves, Eigen::Vector3d(eaves + x)}) {
-    Look end = wall;
+    Appearance end = wall;
     end.pattern = Pattern::kNone;
     const Station& s = at;
     b.rectangle(s, foot + 0.25 * y, 0.5 * y, Eigen::Vector3d(0, 0, 0.19 * size.y()), end);
@@ -120,7 +120,7 @@ void add_house(WorldBuilder& b, const Station& at, const House& h, PlaceRandom& 
   const SE3 T{Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
               {h.middle.x(), h.middle.y(), at.p.z() + 0.14}};
   const Eigen::Vector3d size(2.0 * h.half_width, 2.0 * h.half_depth, height);
-  Look wall;
+  Appearance wall;
   wall.material = random.chance(0.4) ? Material::kBrick : Material::kPlaster;
   wall.tint = static_cast<float>(random.uniform(0.65, 1.4));
   const double bay = random.uniform(1.9, 3.0);

@@ -9,8 +9,8 @@
 namespace roadfix {
 namespace {
 
-constexpr double kStep_s = 0.04;     // between the points of the way: 1.5 m at 130 km/h
-constexpr double kShortest_m = 2.5;  // a way that has a direction
+constexpr double kStep_s = 0.04;     // between the points of the path: 1.5 m at 130 km/h
+constexpr double kShortest_m = 2.5;  // a path that has a direction
 
 StreetPlan plan_of(const SimulatedDrive& drive) {
   const SceneConfig& scene = drive.config.scene;

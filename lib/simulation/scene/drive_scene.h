@@ -7,7 +7,7 @@
 
 namespace roadfix {
 
-/// The street around the way driven, from the drive's seed.
+/// The street around the path driven, from the drive's seed.
 World world_of(const SimulatedDrive& drive);
 
 /// The true cameras of a drive. Without stereo the right one is not used.

@@ -5,7 +5,7 @@
 namespace roadfix {
 namespace {
 
-const Look kPost{Material::kMetal, Pattern::kCourses, 0.7F, 1.0F, 0.5F};
+const Appearance kPost{Material::kMetal, Pattern::kCourses, 0.7F, 1.0F, 0.5F};
 
 /// A rectangle in a car's own axes.
 void car_rectangle(std::vector<Face>& faces, const Eigen::Vector3d& corner, const Eigen::Vector3d& a,
@@ -153,7 +153,7 @@ void build_furniture(WorldBuilder& b) {
 }
 
 void build_car_parks(WorldBuilder& b) {
-  // Rows of bays across the whole lot, axes of the first station; bays that the way passes stay empty.
+  // Rows of bays across the whole lot, axes of the first station; bays that the path passes stay empty.
   int first = -1;
   for (int i = 0; i < b.line.size() && first < 0; ++i) {
     if (b.line[i].kind == StreetKind::kCarPark) first = i;
@@ -196,7 +196,7 @@ void build_car_parks(WorldBuilder& b) {
       b.box(at, {beside(at, 0).q, place(x, y + 5.2, 6.0)}, {0.4, 1.6, 0.15}, kPost, kPost);
     }
   }
-  const Look hall{Material::kBrick, Pattern::kWindows, 1.0F, 3.2F, 3.5F};
+  const Appearance hall{Material::kBrick, Pattern::kWindows, 1.0F, 3.2F, 3.5F};
   const double width = hi.x() - lo.x();
   const double depth = hi.y() - lo.y();
   const double height = 10.5;
@@ -208,7 +208,7 @@ void build_car_parks(WorldBuilder& b) {
 
 void build_movers(WorldBuilder& b) {
   const auto lane = [&](double t, bool backwards) {
-    Mover m;
+    MovingObject m;
     for (const Station& s : b.line.stations()) {
       const bool road = s.kind != StreetKind::kCorridor && s.kind != StreetKind::kCarPark;
       if (!road) continue;
@@ -222,11 +222,11 @@ void build_movers(WorldBuilder& b) {
     return m;
   };
   const bool highway = b.line[0].kind == StreetKind::kHighway;
-  const Mover oncoming = lane(highway ? 16.0 : 3.5, true);
-  const Mover overtaking = lane(3.5, false);
+  const MovingObject oncoming = lane(highway ? 16.0 : 3.5, true);
+  const MovingObject overtaking = lane(3.5, false);
   if (oncoming.lane.size() < 100) return;
   PlaceRandom random = b.random(b.line[0].p, "traffic");
-  const auto add = [&](Mover m, double at_m, double speed) {
+  const auto add = [&](MovingObject m, double at_m, double speed) {
     m.start_m = at_m;
     m.speed = speed;
     m.faces = car_faces(random.bits());

@@ -117,9 +117,9 @@ RayHit RayWindow::nearest(const Eigen::Vector3d& origin, const Eigen::Vector3d& 
 
 bool RayWindow::occluded(const Eigen::Vector3d& from_enu, const Eigen::Vector3d& to_enu) const {
   const Eigen::Vector3d from = from_enu - impl_->origin;
-  const Eigen::Vector3d way = to_enu - from_enu;
-  const double reach = 1.0 - kShort_m / way.norm();
-  return impl_->still->blocked(from, way, reach) || impl_->moving->blocked(from, way, reach);
+  const Eigen::Vector3d segment = to_enu - from_enu;
+  const double reach = 1.0 - kShort_m / segment.norm();
+  return impl_->still->blocked(from, segment, reach) || impl_->moving->blocked(from, segment, reach);
 }
 
 struct RayScene::Impl {
@@ -146,7 +146,7 @@ struct RayScene::Impl {
     window.faces.resize(window.num_static);
     window.corners.resize(window.num_static);
     window.triangles.resize(2 * window.num_static);
-    for (const Mover& m : world->movers) {
+    for (const MovingObject& m : world->movers) {
       const SE3 T_enu_car = m.pose(t_s);
       if ((T_enu_car.p - window.origin).norm() > kWindowRadius_m) continue;
       const Eigen::Vector3d velocity = m.velocity(t_s);

@@ -2,7 +2,7 @@
 /// grid point near the camera, in coordinates from that point. The window depends on the camera's position alone, never
 /// on what was asked before.
 ///
-/// Pictures look through tiles.h and towards the sun through sun_grid.h, which know that their rays share an origin or
+/// Pictures look through tiles.h and towards the sun through sun_grid.h, which use that their rays share an origin or
 /// a direction; single rays walk through triangle_tree.h. All three propose triangles, and the doubles of triangle.h
 /// decide which is hit.
 #pragma once

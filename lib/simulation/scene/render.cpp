@@ -79,26 +79,26 @@ Renderer::Pixels Renderer::row_of_pixels(int column, int row) const {
 namespace {
 
 /// What the light field keeps of the faces under eight pixels.
-struct Seen {
+struct SurfaceSample {
   U8 group{};
   F8 velocity[3] = {splat(0.0F), splat(0.0F), splat(0.0F)};
 };
 
-Seen seen_of(const RayWindow& window, const HitLanes& hit) {
-  Seen seen;
+SurfaceSample sample_surface(const RayWindow& window, const HitLanes& hit) {
+  SurfaceSample sample;
   if (hit.face[0] >= 0 && !any(hit.face != hit.face[0])) {  // the usual case
     const FaceShade& face = window.faces()[static_cast<std::size_t>(hit.face[0])];
-    seen.group = splat(face.group);
-    for (std::size_t k = 0; k < 3; ++k) seen.velocity[k] = splat(face.velocity[k]);
-    return seen;
+    sample.group = splat(face.group);
+    for (std::size_t k = 0; k < 3; ++k) sample.velocity[k] = splat(face.velocity[k]);
+    return sample;
   }
   for (int i = 0; i < kLanes; ++i) {
     if (hit.face[i] < 0) continue;
     const FaceShade& face = window.faces()[static_cast<std::size_t>(hit.face[i])];
-    seen.group[i] = face.group;
-    for (std::size_t k = 0; k < 3; ++k) seen.velocity[k][i] = face.velocity[k];
+    sample.group[i] = face.group;
+    for (std::size_t k = 0; k < 3; ++k) sample.velocity[k][i] = face.velocity[k];
   }
-  return seen;
+  return sample;
 }
 
 /// Rays through (x, y, 1) in camera axes, so that distances along them are depths.
@@ -130,14 +130,14 @@ void Renderer::first_pass(const Frame& frame, int band, LightField& out) const {
       const HitLanes hit = frame.lists.intersect(band, {tile, tile}, rays.ray.direction);
       const Shade s = shade(frame.window, frame.to_sun, rays, hit);
       const I8 sky = hit.face < 0;
-      const Seen seen = seen_of(frame.window, hit);
+      const SurfaceSample sample = sample_surface(frame.window, hit);
       // Velocity of the point against the camera over its depth, in camera axes, then in pixels.
       const Lanes3& d = rays.ray.direction;
       const F8 per_depth = select(sky, splat(0.0F), 1.0F / hit.distance);
       const Eigen::Vector3f& rate = frame.rate;
-      const F8 wx = rate.z() * d.y - rate.y() * d.z + (seen.velocity[0] - frame.drift.x()) * per_depth;
-      const F8 wy = rate.x() * d.z - rate.z() * d.x + (seen.velocity[1] - frame.drift.y()) * per_depth;
-      const F8 wz = rate.y() * d.x - rate.x() * d.y + (seen.velocity[2] - frame.drift.z()) * per_depth;
+      const F8 wx = rate.z() * d.y - rate.y() * d.z + (sample.velocity[0] - frame.drift.x()) * per_depth;
+      const F8 wy = rate.x() * d.z - rate.z() * d.x + (sample.velocity[1] - frame.drift.y()) * per_depth;
+      const F8 wz = rate.y() * d.x - rate.x() * d.y + (sample.velocity[2] - frame.drift.z()) * per_depth;
       const Eigen::Matrix3f& R = frame.R;
       const F8 cz = R(0, 2) * wx + R(1, 2) * wy + R(2, 2) * wz;
       const F8 nx = R(0, 0) * wx + R(1, 0) * wy + R(2, 0) * wz - p.x * cz;
@@ -149,7 +149,7 @@ void Renderer::first_pass(const Frame& frame, int band, LightField& out) const {
       store(&out.depth[at], select(sky, splat(std::numeric_limits<float>::infinity()), hit.distance), count);
       store(&out.flow_u[at], (p.y_v * nx - p.x_v * ny) * per_determinant, count);
       store(&out.flow_v[at], (p.x_u * ny - p.y_u * nx) * per_determinant, count);
-      const U8 surface = 2U * seen.group + (U8)(s.sunlit & 1);
+      const U8 surface = 2U * sample.group + (U8)(s.sunlit & 1);
       store(&out.surface[at], select(sky, U8{}, surface), count);
     }
   }
@@ -162,7 +162,7 @@ void Renderer::edge_pass(const Frame& frame, int band, LightField& out) const {
     return (x > 0 && *surface(x - 1, y) != here) || (x + 1 < width_ && *surface(x + 1, y) != here) ||
            (y > 0 && *surface(x, y - 1) != here) || (y + 1 < height_ && *surface(x, y + 1) != here);
   };
-  // Whether none of the eight pixels from (x, y) on is: a quick look that may say no.
+  // Whether none of the eight pixels from (x, y) on is: a quick test that may miss some.
   const auto smooth = [&](int x, int y) {
     if (x == 0 || x + kLanes >= width_ || y == 0 || y + 1 == height_) return false;
     const U8 here = load(surface(x, y));

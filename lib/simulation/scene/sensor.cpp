@@ -59,7 +59,7 @@ F8 load_some(const std::vector<float>& from, std::size_t at, int count) {
   return x;
 }
 
-/// Mean light over the way that the surface takes through each of `count` pixels while the shutter is open, centred on
+/// Mean light over the path that the surface takes through each of `count` pixels while the shutter is open, centred on
 /// its middle.
 F8 blurred(const LightField& light, int x, int y, int count, float exposure_s) {
   const auto at = static_cast<std::size_t>(y * light.width + x);

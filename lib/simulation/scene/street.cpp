@@ -72,7 +72,7 @@ void WorldBuilder::add(Face face) {
 }
 
 void WorldBuilder::rectangle(const Station& near, const Eigen::Vector3d& corner, const Eigen::Vector3d& a,
-                             const Eigen::Vector3d& b, const Look& look, const Eigen::Vector2d& st) {
+                             const Eigen::Vector3d& b, const Appearance& look, const Eigen::Vector2d& st) {
   Face f;
   f.corner = {corner, corner + a, corner + a + b, corner + b};
   f.material = look.material;
@@ -88,8 +88,8 @@ void WorldBuilder::rectangle(const Station& near, const Eigen::Vector3d& corner,
   add(f);
 }
 
-void WorldBuilder::box(const Station& near, const SE3& T_enu_box, const Eigen::Vector3d& size, const Look& side,
-                       const Look& top) {
+void WorldBuilder::box(const Station& near, const SE3& T_enu_box, const Eigen::Vector3d& size, const Appearance& side,
+                       const Appearance& top) {
   const Eigen::Vector3d x = T_enu_box.q * Eigen::Vector3d(size.x(), 0.0, 0.0);
   const Eigen::Vector3d y = T_enu_box.q * Eigen::Vector3d(0.0, size.y(), 0.0);
   const Eigen::Vector3d z = T_enu_box.q * Eigen::Vector3d(0.0, 0.0, size.z());
@@ -101,7 +101,7 @@ void WorldBuilder::box(const Station& near, const SE3& T_enu_box, const Eigen::V
   rectangle(near, o + z, x, y, top);
 }
 
-void WorldBuilder::ribbon(int first, int last, int step, Rail a, Rail b, const Look& look) {
+void WorldBuilder::ribbon(int first, int last, int step, RibbonEdge a, RibbonEdge b, const Appearance& look) {
   const double width = std::hypot(b.t - a.t, b.z - a.z);
   PlaceRandom place = random(line[first].at(a.t, a.z) + line[first].at(b.t, b.z), "ribbon");
   const std::uint32_t key = place.bits();
@@ -159,14 +159,14 @@ std::vector<bool> crossing_allowed(const StreetLine& line) {
 void build_roads(WorldBuilder& b) {
   const auto kind_is = [](auto... kinds) { return [=](const Station& s) { return ((s.kind == kinds) || ...); }; };
   const auto crossings = crossing_allowed(b.line);
-  const Look pavement{Material::kPavement, Pattern::kCourses, 1.0F, 0.5F, 0.5F};
-  const Look kerb{Material::kPavement, Pattern::kCourses, 1.1F, 1.0F, 4.0F};
+  const Appearance pavement{Material::kPavement, Pattern::kCourses, 1.0F, 0.5F, 0.5F};
+  const Appearance kerb{Material::kPavement, Pattern::kCourses, 1.1F, 1.0F, 4.0F};
   for_stretches(b.line, kind_is(StreetKind::kStreet, StreetKind::kBridge), [&](int i, int j) {
     for (int k = i; k < j;) {
       int end = k + 1;
       const bool crossing = crossings[static_cast<std::size_t>(k)];
       while (end < j && crossings[static_cast<std::size_t>(end)] == crossing) ++end;
-      const Look road{Material::kAsphalt, crossing ? Pattern::kTwoLanes : Pattern::kBareLanes};
+      const Appearance road{Material::kAsphalt, crossing ? Pattern::kTwoLanes : Pattern::kBareLanes};
       b.ribbon(k, end, 8, {-4.3, 0.0}, {7.8, 0.0}, road);
       k = end;
     }
@@ -176,7 +176,7 @@ void build_roads(WorldBuilder& b) {
     b.ribbon(i, j, 8, {7.8, 0.14}, {11.1, 0.14}, pavement);
   });
   for_stretches(b.line, kind_is(StreetKind::kHighway), [&](int i, int j) {
-    const Look rail{Material::kMetal, Pattern::kCourses, 1.3F, 4.0F, 1.0F};
+    const Appearance rail{Material::kMetal, Pattern::kCourses, 1.3F, 4.0F, 1.0F};
     b.ribbon(i, j, 8, {-4.5, 0.0}, {9.8, 0.0}, {Material::kAsphalt, Pattern::kThreeLanes});
     b.ribbon(i, j, 8, {12.2, 0.0}, {24.0, 0.0}, {Material::kAsphalt, Pattern::kNone});
     for (const double t : {-5.3, 10.6, 11.4, 25.0}) b.ribbon(i, j, 8, {t, 0.48}, {t, 0.80}, rail);

@@ -1,4 +1,4 @@
-/// A street built around the way that the vehicle drives: road with markings, house fronts, parked and moving cars,
+/// A street built around the path that the vehicle drives: road with markings, house fronts, parked and moving cars,
 /// poles, tunnels, a bridge, a corridor.
 ///
 /// Everything random on it comes from hashes of the seed and of the place, so that no two places look alike by

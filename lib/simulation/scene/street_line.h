@@ -1,4 +1,4 @@
-/// The driven way as a line of stations 1 m apart, extended straight at both ends so that the world does not end where
+/// The driven path as a line of stations 1 m apart, extended straight at both ends so that the world does not end where
 /// the drive does.
 #pragma once
 

@@ -127,7 +127,7 @@ I8 SunGrid::shaded(const Lanes3& point, I8 active, float reach_m) const {
   const I8 cell = to_int(select(over_grid, y, splat(0.0F))) * size_[0] + to_int(select(over_grid, x, splat(0.0F)));
   const Lanes3 sun = splat(to_sun_);
   I8 left = over_grid;
-  I8 doubtful{};
+  I8 uncertain{};
   for (int i = 0; i < kLanes; ++i) {
     if (left[i] == 0) continue;
     const auto k = static_cast<std::size_t>(cell[i]);
@@ -140,16 +140,16 @@ I8 SunGrid::shaded(const Lanes3& point, I8 active, float reach_m) const {
       const F8 length = abs(from_point.x) + abs(from_point.y) + abs(from_point.z);
       const Proposal hit = propose(t, from_point, length, sun, kUnit, splat(reach_m));
       const I8 certain = hit.certain & (hit.far <= reach_m);
-      doubtful |= hit.possible & ~certain & here;
+      uncertain |= hit.possible & ~certain & here;
       dark |= certain & here;
       if (!any(here & ~dark)) break;
     }
     left &= ~here;
   }
-  doubtful &= ~dark;
-  if (!any(doubtful)) return dark;
+  uncertain &= ~dark;
+  if (!any(uncertain)) return dark;
   for (int i = 0; i < kLanes; ++i) {
-    if (doubtful[i] == 0) continue;
+    if (uncertain[i] == 0) continue;
     const Float3 at{point.x[i], point.y[i], point.z[i]};
     if (blocked(static_cast<std::size_t>(cell[i]), at, height[i], reach_m)) dark[i] = -1;
   }

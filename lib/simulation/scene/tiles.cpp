@@ -146,8 +146,8 @@ void TileLists::add_triangle(std::uint32_t triangle, const Eigen::Vector3f& a, c
   const Eigen::Vector3f normal = ab.cross(ac);
   const float det = normal.dot(a);
   const float reach = std::max({a.norm(), b.norm(), c.norm()});
-  const float doubt = kRounding * reach * (ab.norm() + ac.norm()) / std::abs(det);  // of normal / det
-  s.has_edges = doubt * reach < 0.05F;                                              // not seen edge on
+  const float uncertainty = kRounding * reach * (ab.norm() + ac.norm()) / std::abs(det);  // of normal / det
+  s.has_edges = uncertainty * reach < 0.05F;                                              // not seen edge on
   const float towards = det < 0.0F ? -1.0F : 1.0F;
   for (int k = 0; s.has_edges && k < 3; ++k) {
     const Eigen::Vector3f& p = *corner[k];
@@ -158,7 +158,7 @@ void TileLists::add_triangle(std::uint32_t triangle, const Eigen::Vector3f& a, c
     s.slack[k] = 2.0F * rounding;
   }
   for (Eigen::Index k = 0; k < 3; ++k) s.inverse_depth[static_cast<std::size_t>(k)] = normal[k] / det;
-  s.depth_slack = 2.0F * doubt + kRounding * normal.cwiseAbs().sum() / std::abs(det);
+  s.depth_slack = 2.0F * uncertainty + kRounding * normal.cwiseAbs().sum() / std::abs(det);
   const Float3& first = window_.triangles()[triangle].corner[0];
   s.from_eye = {first[0] - eye_.x(), first[1] - eye_.y(), first[2] - eye_.z()};
   s.length = 1.0001F *
@@ -223,12 +223,12 @@ void TileLists::search(int row, int column, const Lanes3& direction, Nearest& ne
     const Seen& s = seen_[entry.seen];
     const Proposal hit =
         propose(window_.triangles()[s.triangle], splat(s.from_eye), splat(s.length), direction, longest_, nearest.far);
-    nearest.doubtful |= hit.possible & ~hit.certain;
+    nearest.uncertain |= hit.possible & ~hit.certain;
     if (!any(hit.certain)) continue;
     const auto triangle = static_cast<std::int32_t>(s.triangle);
     const I8 before = hit.certain & (hit.far < nearest.near);
     const I8 beside = hit.certain & ~before & (hit.near <= nearest.far) & (nearest.triangle != triangle);
-    nearest.doubtful |= beside;
+    nearest.uncertain |= beside;
     nearest.triangle = select(before, I8{} + triangle, nearest.triangle);
     nearest.near = select(before | beside, min(hit.near, nearest.near), nearest.near);
     nearest.far = select(before | beside, min(hit.far, nearest.far), nearest.far);
@@ -290,8 +290,8 @@ HitLanes TileLists::intersect(int row, std::array<int, 2> columns, const Lanes3&
   Nearest nearest{I8{} - 1, splat(kFarthest_m), splat(kFarthest_m), I8{}};
   search(row, columns[0], direction, nearest);
   if (columns[1] != columns[0]) search(row, columns[1], direction, nearest);
-  for (int i = 0; any(nearest.doubtful) && i < kLanes; ++i) {
-    if (nearest.doubtful[i] == 0) continue;
+  for (int i = 0; any(nearest.uncertain) && i < kLanes; ++i) {
+    if (nearest.uncertain[i] == 0) continue;
     nearest.triangle[i] =
         decide(row, columns[static_cast<std::size_t>(i / 4)], {direction.x[i], direction.y[i], direction.z[i]});
   }

@@ -3,7 +3,7 @@
 ///
 /// The lists are conservative: whatever a ray of the tile would hit first is in its list, so the nearest hit in the
 /// list is the nearest of all. Floats find it in most lanes; where rounding could decide (at a face's very edge, or
-/// between two faces in one plane), doubles go through the list. Where on the face it lies is told by doubles always.
+/// between two faces in one plane), doubles go through the list. Its place on the face is computed in doubles always.
 #pragma once
 
 #include <vector>
@@ -86,7 +86,7 @@ class TileLists {
   struct Nearest {
     I8 triangle;
     F8 near, far;
-    I8 doubtful;
+    I8 uncertain;
   };
   void search(int row, int column, const Lanes3& direction, Nearest& nearest) const;
   /// The same in doubles, for one ray.

@@ -112,7 +112,7 @@ struct TrackSimulator::Impl {
     return point.mover < 0 ? point.p : world.movers[static_cast<std::size_t>(point.mover)].pose(t_s) * point.p;
   }
 
-  /// Pixel of a point that the camera sees, nothing in its way.
+  /// Pixel of a point that the camera sees, not occluded.
   [[nodiscard]] std::optional<Eigen::Vector2d> sees(const Camera& camera, const SE3& T_enu_camera,
                                                     const RayWindow& window, const Eigen::Vector3d& p_enu) const {
     const Eigen::Vector3d p = T_enu_camera.q.conjugate() * (p_enu - T_enu_camera.p);

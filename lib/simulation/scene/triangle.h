@@ -35,7 +35,7 @@ inline Lanes3 cross_fused(const Lanes3& a, const Lanes3& b) {
 /// The triangles of a face.
 std::array<Triangle, 2> triangles_of(const std::array<Float3, 4>& corner);
 
-/// What floats can tell of a hit.
+/// What floats decide of a hit.
 struct Proposal {
   I8 possible;   ///< a hit, whatever the rounding was, lies in these lanes
   I8 certain;    ///< of those, the lanes that hit in spite of any rounding
@@ -75,9 +75,9 @@ inline Proposal propose(const Triangle& t, const Lanes3& from_origin, F8 length,
     return p;
   }
   const F8 distance = height / scale;
-  const F8 doubt = 2.0F * (height_error + distance * scale_error) / scale;
-  p.near = distance - doubt;
-  p.far = distance + doubt;
+  const F8 uncertainty = 2.0F * (height_error + distance * scale_error) / scale;
+  p.near = distance - uncertainty;
+  p.far = distance + uncertainty;
   return p;
 }
 

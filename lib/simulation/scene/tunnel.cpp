@@ -12,8 +12,8 @@ constexpr double kCorridorHeight = 2.8;
 constexpr double kDeck = 6.0;  // underside of the bridge
 
 void build_tunnel(WorldBuilder& b, int i, int j) {
-  const Look wall{Material::kTunnelWall, Pattern::kCourses, 1.0F, 2.0F, 1.25F};
-  const Look ceiling{Material::kConcrete, Pattern::kCourses, 0.8F, 4.0F, 2.0F};
+  const Appearance wall{Material::kTunnelWall, Pattern::kCourses, 1.0F, 2.0F, 1.25F};
+  const Appearance ceiling{Material::kConcrete, Pattern::kCourses, 0.8F, 4.0F, 2.0F};
   constexpr int kStep = 2;  // fine enough for the pools of light
   b.ribbon(i, j, kStep, {kRight, 0.0}, {kLeft, 0.0}, {Material::kAsphalt, Pattern::kBareLanes});
   for (const double t : {kRight, kLeft}) {
@@ -52,7 +52,7 @@ void build_tunnel(WorldBuilder& b, int i, int j) {
 /// The wall around a mouth, on the side where the open road is.
 void build_portal(WorldBuilder& b, int station) {
   const Station& at = b.line[station];
-  const Look stone{Material::kConcrete, Pattern::kCourses, 1.0F, 1.6F, 0.8F};
+  const Appearance stone{Material::kConcrete, Pattern::kCourses, 1.0F, 1.6F, 0.8F};
   Station outside = at;
   outside.kind = StreetKind::kStreet;
   const auto wall = [&](double t0, double t1, double z0, double z1) {
@@ -64,8 +64,8 @@ void build_portal(WorldBuilder& b, int station) {
 }
 
 void build_bridge(WorldBuilder& b, int i, int j) {
-  const Look concrete{Material::kConcrete, Pattern::kCourses, 0.9F, 4.0F, 2.0F};
-  const Look edge{Material::kConcrete, Pattern::kCourses, 1.0F, 2.0F, 0.8F};
+  const Appearance concrete{Material::kConcrete, Pattern::kCourses, 0.9F, 4.0F, 2.0F};
+  const Appearance edge{Material::kConcrete, Pattern::kCourses, 1.0F, 2.0F, 0.8F};
   b.ribbon(i, j, 4, {1.75, kDeck}, {-13.0, kDeck}, concrete);
   b.ribbon(i, j, 4, {16.5, kDeck}, {1.75, kDeck}, concrete);
   b.ribbon(i, j, 8, {-13.0, kDeck + 1.6}, {16.5, kDeck + 1.6}, {Material::kAsphalt});
@@ -93,9 +93,9 @@ void build_bridge(WorldBuilder& b, int i, int j) {
   }
 }
 
-/// One wall of a corridor, open where the way comes through from another one.
+/// One wall of a corridor, open where the path comes through from another one.
 void build_corridor_wall(WorldBuilder& b, int i, int j, double t) {
-  const Look wall{Material::kBlankWall};
+  const Appearance wall{Material::kBlankWall};
   const auto open_at = [&](int k) { return b.line.passes_elsewhere(b.line[k].at(t, 0.0), kDoorway, k); };
   for (int k = i; k < j;) {
     int end = k;

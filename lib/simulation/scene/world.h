@@ -60,7 +60,7 @@ struct Face {
 };
 
 /// A car that drives along a lane for ever; the last point of its lane joins the first.
-struct Mover {
+struct MovingObject {
   std::vector<Eigen::Vector3d> lane;  ///< on the ground, 1 m apart
   std::vector<Face> faces;            ///< vehicle axes of the car, origin on the ground under its middle
   std::vector<float> lane_light;      ///< per lane point: light there over that under the open sky
@@ -75,7 +75,7 @@ struct Mover {
 
 struct World {
   std::vector<Face> faces;
-  std::vector<Mover> movers;
+  std::vector<MovingObject> movers;
   Eigen::Vector3d to_sun = Eigen::Vector3d(0.5, -0.4, 0.77).normalized();
 };
 
