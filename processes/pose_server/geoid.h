@@ -23,7 +23,7 @@ class GeoidModel {
   GeoidModel(const GeoidModel&) = delete;
   GeoidModel& operator=(const GeoidModel&) = delete;
 
-  /// m above the ellipsoid; absent where the file does not tell.
+  /// m above the ellipsoid; absent where the file does not contain it.
   [[nodiscard]] std::optional<double> separation_m(double lat_deg, double lon_deg) const;
   [[nodiscard]] const std::string& name() const { return name_; }
 

@@ -48,7 +48,7 @@ PoseServerHandler::PoseServerHandler(const PoseServerConfig& config, const Geoid
 
 std::string PoseServerHandler::take(const BusMessage& message, int64_t now_us) {
   const auto input = inputs_.find(message.channel);
-  // The pose that ends a silence is told, not the silence.
+  // The pose that ends a silence is sent, not the silence.
   if (message.channel == config_.pose_channel) {
     now_us_ = now_us;
   } else {
@@ -75,18 +75,18 @@ void PoseServerHandler::take_gnss(std::span<const uint8_t> bytes) {
 
 void PoseServerHandler::take_aiding(std::span<const uint8_t> bytes) {
   const auto m = decode<aiding_t>(bytes);
-  aiding_heard_ = true;
+  aiding_received_ = true;
   if (m.source != aiding_t::SOURCE_GNSS_POSITION) return;
   if (m.status == aiding_t::STATUS_ACCEPTED || m.status == aiding_t::STATUS_RESET) accepted_us_ = m.measurement_utime;
 }
 
-/// Where an estimator tells which fixes it took, a fix that it did not take is none.
+/// Where an estimator publishes which fixes it took, a fix that it did not take is none.
 FixFacts PoseServerHandler::fix_at(int64_t t_us) const {
   FixFacts facts;
   if (fix_) facts.height_kind = fix_->height_kind;  // heights stay of their kind when the fixes stop
   const int64_t oldest_us = t_us - microseconds(config_.fix_age);
   if (!fix_ || fix_us_ < oldest_us) return facts;
-  if (aiding_heard_ && (!accepted_us_ || *accepted_us_ < oldest_us)) return facts;
+  if (aiding_received_ && (!accepted_us_ || *accepted_us_ < oldest_us)) return facts;
   return *fix_;
 }
 

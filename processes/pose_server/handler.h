@@ -27,7 +27,7 @@ class PoseServerHandler {
 
   [[nodiscard]] int64_t poses() const { return poses_; }
   [[nodiscard]] int64_t refused() const { return refused_; }  ///< undecodable, or not newer than the one before
-  /// In plain words; empty where positions go out.
+  /// As text; empty where positions go out.
   [[nodiscard]] const std::string& state_reason() const { return state_reason_; }
 
  private:
@@ -51,7 +51,7 @@ class PoseServerHandler {
   std::optional<FixFacts> fix_;
   int64_t fix_us_ = 0;                  ///< of fix_
   std::optional<int64_t> accepted_us_;  ///< of the newest fix whose position an estimator took
-  bool aiding_heard_ = false;
+  bool aiding_received_ = false;
   std::optional<int64_t> pose_us_;     ///< utime of the newest pose
   std::optional<int64_t> arrived_us_;  ///< when it came; before the first pose: when time began
   int64_t now_us_ = 0;

@@ -12,7 +12,7 @@ namespace roadfix {
 
 namespace {
 
-/// A course is told where the speed is this many of its sigmas: below, it is the direction of noise.
+/// A course is sent where the speed is this many of its sigmas: below, it is the direction of noise.
 constexpr double kCourseSigmas = 3.0;
 constexpr double kSlowest_mps = 0.1;
 

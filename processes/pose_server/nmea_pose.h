@@ -19,7 +19,7 @@ struct FixFacts {
   std::optional<double> correction_age_s;
 };
 
-/// `point`: the place that is told, in vehicle axes from the pose's origin. Invalid poses, poses of a local frame or of
+/// `point`: its position is sent, in vehicle axes from the pose's origin. Invalid poses, poses of a local frame or of
 /// unknown scale have neither position nor heading; a coasting one is dead reckoning whatever the fix.
 /// Heights above sea level: as they are where the receiver's are; by the geoid where there is one and the receiver's
 /// are above the ellipsoid; otherwise absent.

@@ -27,12 +27,12 @@ class Outlet {
   virtual void step(Clock::time_point now) = 0;
   /// For the user: where it is found, for example "tcp 127.0.0.1:10110".
   [[nodiscard]] virtual std::string name() const = 0;
-  /// In plain words; empty where all is well.
+  /// As text; empty where nothing is wrong.
   [[nodiscard]] virtual std::string state_reason() const { return {}; }
 };
 
-/// Listens at once. A client that takes nothing for `patience_s` is let go; those beyond `most` are turned away.
-std::unique_ptr<Outlet> listen_tcp(const std::string& address, int most, double patience_s);
+/// Listens at once. A client that takes nothing for `timeout_s` is let go; those beyond `most` are turned away.
+std::unique_ptr<Outlet> listen_tcp(const std::string& address, int most, double timeout_s);
 /// One datagram for what is due at one moment; a receiver that is not there costs nothing.
 std::unique_ptr<Outlet> send_udp(const std::string& address);
 /// "/dev/ttyUSB0", opened again after it was unplugged; or "pty:", a pseudo-terminal of our own.

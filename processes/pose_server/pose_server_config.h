@@ -15,11 +15,11 @@ struct SentenceRates {
 
 struct PoseServerConfig {
   std::string pose_channel = "POSE_FUSED";
-  std::string gnss_channel = "GNSS";          ///< type of fix, satellites; whose position was used, aiding tells
+  std::string gnss_channel = "GNSS";          ///< type of fix, satellites; aiding holds whose position was used
   std::string aiding_channel = "AIDING_INS";  ///< which fixes were accepted
   std::string talker = "GN";                  ///< IN: integrated navigation
   SentenceRates rates;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< m, vehicle axes from the pose's origin: the place that is told
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< m, vehicle axes from the pose's origin: the point that is sent
   double fix_age = 2.0;                             ///< s without an accepted fix after which a pose is dead reckoning
   double silence = 0.5;  ///< s without a pose after which sentences say that there is no position
   /// "auto": the finest of GeographicLib's geoids that is installed; "none"; or one's name, for example egm96-5.

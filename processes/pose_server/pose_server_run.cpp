@@ -24,7 +24,7 @@ namespace roadfix {
 namespace {
 
 /// Also how late a client is noticed, and a slow one served.
-constexpr auto kPatience = std::chrono::milliseconds(20);
+constexpr auto kPollTimeout = std::chrono::milliseconds(20);
 constexpr int64_t kHeartbeat_us = 1'000'000;
 
 /// HEARTBEAT_POSE_SERVER.
@@ -93,7 +93,7 @@ void run_live(const PoseServerOptions& options, const PoseServerConfig& config) 
   service.ready(places);
   int64_t next_heartbeat_us = 0;
   while (!stop_requested()) {
-    bus.handle(kPatience);
+    bus.handle(kPollTimeout);
     service.alive();
     const int64_t now_us = clock.now_utime();
     send(handler.advance(now_us));

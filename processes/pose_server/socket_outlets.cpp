@@ -31,10 +31,10 @@ Descriptor open_socket(const SocketAddress& address, int type, const std::string
 
 class TcpOutlet final : public Outlet {
  public:
-  TcpOutlet(const std::string& text, int most, double patience_s)
+  TcpOutlet(const std::string& text, int most, double timeout_s)
       : address_(text),
         most_(static_cast<std::size_t>(most)),
-        patience_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s))) {
+        timeout_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s))) {
     const SocketAddress address = socket_address("tcp", text);
     listener_ = open_socket(address, SOCK_STREAM, name());
     const int yes = 1;
@@ -97,7 +97,7 @@ class TcpOutlet final : public Outlet {
 
   void flush(Clock::time_point now) {
     for (Client& client : clients_) {
-      client.gone = client.gone || !client.queue.flush(client.socket.get(), now) || client.queue.stuck(now) > patience_;
+      client.gone = client.gone || !client.queue.flush(client.socket.get(), now) || client.queue.stuck(now) > timeout_;
     }
     std::erase_if(clients_, [](const Client& client) { return client.gone; });
   }
@@ -120,7 +120,7 @@ class TcpOutlet final : public Outlet {
 
   std::string address_;
   std::size_t most_;
-  Clock::duration patience_;
+  Clock::duration timeout_;
   Descriptor listener_;
   std::vector<Client> clients_;
   bool turned_away_ = false;
@@ -196,8 +196,8 @@ SocketAddress socket_address(const std::string& what, const std::string& text) {
   return address;
 }
 
-std::unique_ptr<Outlet> listen_tcp(const std::string& address, int most, double patience_s) {
-  return std::make_unique<TcpOutlet>(address, most, patience_s);
+std::unique_ptr<Outlet> listen_tcp(const std::string& address, int most, double timeout_s) {
+  return std::make_unique<TcpOutlet>(address, most, timeout_s);
 }
 
 std::unique_ptr<Outlet> send_udp(const std::string& address) { return std::make_unique<UdpOutlet>(address); }

@@ -18,10 +18,10 @@
 namespace roadfix {
 namespace {
 
-constexpr auto kPatience = std::chrono::milliseconds(50);
-/// Four times as often as a stage: it has no output whose silence would tell that it died.
+constexpr auto kPollTimeout = std::chrono::milliseconds(50);
+/// Four times as often as a stage: it has no output whose silence would show that it died.
 constexpr int64_t kHeartbeat_us = 250'000;
-/// The recording ended before it was told to: disk full, quota used up.
+/// The recording ended before it was asked to: disk full, quota used up.
 constexpr int kStoppedEarly = 3;
 
 int record(const CommandLine& arguments, const std::string& folder) {
@@ -54,7 +54,7 @@ int record(const CommandLine& arguments, const std::string& folder) {
   int64_t next_heartbeat_us = 0;
   bool stopped = false;
   while (!stop_requested()) {
-    bus.handle(kPatience);
+    bus.handle(kPollTimeout);
     service.alive();
     const std::optional<std::string> reason = recording.stopped();
     const bool changed = reason.has_value() != stopped;

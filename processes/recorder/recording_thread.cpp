@@ -5,7 +5,7 @@
 namespace roadfix {
 
 namespace {
-constexpr auto kPatience = std::chrono::milliseconds(50);
+constexpr auto kPollTimeout = std::chrono::milliseconds(50);
 constexpr int64_t kTryAgain_us = 500'000;
 }  // namespace
 
@@ -31,7 +31,7 @@ void RecordingThread::work() {
   while (true) {
     const bool last_round = done_;
     while (const std::optional<QueuedMessage> message =
-               queue_.pop(last_round ? std::chrono::milliseconds(0) : kPatience)) {
+               queue_.pop(last_round ? std::chrono::milliseconds(0) : kPollTimeout)) {
       recording_.write(message->channel, message->received_us, message->data);
       recording_.flush(clock.now_utime());
       look(clock.now_utime());

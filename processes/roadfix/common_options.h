@@ -2,7 +2,7 @@
 /// of the same name itself; test/scripts/tool_test.py holds all of them against each other.
 ///
 /// Exit status of every program: 0 done; 1 done, and what was looked at is not good (verify, log check, doctor); 2 not
-/// done, for a reason that the user can mend, which is said on standard error as "roadfix SUBCOMMAND: ...".
+/// done, for a reason that the user can mend, which is printed on standard error as "roadfix SUBCOMMAND: ...".
 #pragma once
 
 #include <filesystem>

@@ -65,7 +65,7 @@ void write(std::ostream& out, const PoseStream& stream, const Options& options, 
   }
 }
 
-/// The whole log; what is said goes to standard error, where the file may not be.
+/// The whole log; messages go to standard error, where the file may not be.
 void run_mcap(const Options& options) {
   LogReader log(options.log);
   OutputFile out(options.out.path);

@@ -13,7 +13,7 @@ namespace roadfix {
 std::vector<std::string> stage_names();
 
 /// Whether a vehicle with this folder has what the stage is for: without a camera nobody wants the visual one, and
-/// nobody need be told that it is not there. A calibration that cannot be read is another's to tell.
+/// its absence need not be reported. A calibration that cannot be read is reported elsewhere.
 bool is_for_vehicle(const std::string& stage, const std::filesystem::path& vehicle_dir);
 
 /// Each with the configuration that `vehicle_dir` holds for it. In the order of stage_names(), whatever the order asked

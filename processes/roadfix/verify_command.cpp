@@ -20,7 +20,7 @@ struct VerifyArguments {
   std::vector<std::string> stages;
 };
 
-/// Lists longer than this end in a count: the first ones tell.
+/// Lists longer than this end in a count: the first ones suffice.
 constexpr std::size_t kShown = 10;
 
 void print_list(const std::string& title, const std::vector<std::string>& lines) {

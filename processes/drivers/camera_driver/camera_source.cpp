@@ -24,7 +24,7 @@ constexpr const char* kSelectTimeout_s = "1";
 
 bool is_device(const std::string& name) { return name.starts_with("/dev/"); }
 
-std::string why_not(const std::string& name) {
+std::string open_failure(const std::string& name) {
   if (!is_device(name)) return ": no video or picture file that can be opened";
   return std::filesystem::exists(name) ? ": no camera that can be opened; does another program use it?"
                                        : ": no camera is plugged in there (ls /dev/video*)";
@@ -34,7 +34,7 @@ cv::VideoCapture open_one(const std::string& name, const CameraDriverConfig& con
   cv::VideoCapture capture;
   capture.setExceptionMode(false);
   if (!capture.open(name, is_device(name) ? cv::CAP_V4L2 : cv::CAP_ANY)) {
-    throw SourceError(name + why_not(name));
+    throw SourceError(name + open_failure(name));
   }
   if (!is_device(name)) return capture;
   const auto ask = [&](int property, double value) {

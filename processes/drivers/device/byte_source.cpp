@@ -13,7 +13,7 @@ namespace roadfix {
 namespace {
 constexpr std::size_t kReadBytes = 4096;
 /// A device that does not take its corrections within this is not waited for.
-constexpr int kWritePatience_ms = 50;
+constexpr int kWriteTimeout_ms = 50;
 }  // namespace
 
 std::unique_ptr<ByteSource> open_byte_source(const DeviceConfig& config) {
@@ -56,7 +56,7 @@ bool DescriptorSource::write(std::span<const uint8_t> bytes) {
       continue;
     }
     pollfd wait{descriptor_, POLLOUT, 0};
-    if (errno != EAGAIN || ::poll(&wait, 1, kWritePatience_ms) <= 0) return false;
+    if (errno != EAGAIN || ::poll(&wait, 1, kWriteTimeout_ms) <= 0) return false;
   }
   return true;
 }

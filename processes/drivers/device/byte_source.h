@@ -26,7 +26,7 @@ struct Packet {
 
 enum class ReadState {
   kData,
-  kNothing,  ///< the patience is over
+  kNothing,  ///< the timeout is over
   kEnd,      ///< a file is over: nothing will ever come again
   kLost      ///< the device went away; opening it again may help
 };

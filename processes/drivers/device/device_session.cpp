@@ -11,18 +11,18 @@ bool DeviceSession::open(Clock::time_point now) {
   try {
     source_ = open_();
   } catch (const SourceError& e) {
-    lose(now, e.what());
+    disconnect(now, e.what());
     return false;
   }
-  heard_ = now;
-  why_.clear();
+  last_data_ = now;
+  reason_.clear();
   ++openings_;
   return true;
 }
 
-void DeviceSession::lose(Clock::time_point now, const std::string& why) {
+void DeviceSession::disconnect(Clock::time_point now, const std::string& why) {
   source_.reset();
-  why_ = why;
+  reason_ = why;
   const std::chrono::duration<double> first(config_.reopen_first), most(config_.reopen_max);
   pause_ = pause_ == pause_.zero() ? first : std::min(2.0 * pause_, most);
   due_ = now + std::chrono::duration_cast<Clock::duration>(pause_);
@@ -37,7 +37,7 @@ bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds timeou
   }
   switch (source_->read(timeout, packets)) {
     case ReadState::kData:
-      heard_ = now;
+      last_data_ = now;
       pause_ = pause_.zero();
       break;
     case ReadState::kNothing:
@@ -46,7 +46,7 @@ bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds timeou
       ended_ = true;
       break;
     case ReadState::kLost:
-      lose(now, name() + ": went away");
+      disconnect(now, name() + ": went away");
       break;
   }
   return false;
@@ -55,11 +55,11 @@ bool DeviceSession::step(Clock::time_point now, std::chrono::milliseconds timeou
 std::string DeviceSession::state_reason(Clock::time_point now) const {
   if (ended_) return {};
   if (!source_) {
-    if (why_.empty()) return config_.device + ": not opened yet";
+    if (reason_.empty()) return config_.device + ": not opened yet";
     const double wait_s = due_ ? std::max(0.0, std::chrono::duration<double>(*due_ - now).count()) : 0.0;
-    return fmt::format("{}; tried again in {:.1f} s", why_, wait_s);
+    return fmt::format("{}; tried again in {:.1f} s", reason_, wait_s);
   }
-  const double silent_s = std::chrono::duration<double>(now - heard_).count();
+  const double silent_s = std::chrono::duration<double>(now - last_data_).count();
   return silent_s > config_.silence ? fmt::format("{}: no byte for {:.0f} s", name(), silent_s) : std::string();
 }
 

@@ -21,7 +21,7 @@ class DeviceSession {
 
   /// A file that is over.
   [[nodiscard]] bool ended() const { return ended_; }
-  /// In plain words, empty where bytes come.
+  /// As text, empty where bytes come.
   [[nodiscard]] std::string state_reason(Clock::time_point now) const;
   [[nodiscard]] ByteSource* source() { return source_.get(); }
   [[nodiscard]] std::string name() const { return source_ ? source_->name() : config_.device; }
@@ -29,15 +29,15 @@ class DeviceSession {
 
  private:
   bool open(Clock::time_point now);
-  void lose(Clock::time_point now, const std::string& why);
+  void disconnect(Clock::time_point now, const std::string& why);
 
   Open open_;
   DeviceConfig config_;
   std::unique_ptr<ByteSource> source_;
   std::optional<Clock::time_point> due_;  ///< of the next attempt to open
-  Clock::time_point heard_{};
+  Clock::time_point last_data_{};
   std::chrono::duration<double> pause_{0.0};
-  std::string why_;
+  std::string reason_;
   bool ended_ = false;
   int64_t openings_ = 0;
 };

@@ -1,6 +1,6 @@
 /// What a driver is: a function from the bytes of a device, with the times at which they were read, to messages. Live,
 /// the bytes come from the device and go out as RAW_<DEVICE> beside the messages; a replay takes them from a log. The
-/// driver cannot tell which, and gives the same messages, byte for byte.
+/// driver cannot distinguish them, and gives the same messages, byte for byte.
 #pragma once
 
 #include <functional>
@@ -71,7 +71,7 @@ class SensorDriver {
   virtual void opened(int stream) = 0;
   virtual void take(int stream, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) = 0;
   [[nodiscard]] virtual std::vector<StreamCounters> counters() const = 0;
-  /// What the device itself says is the matter, in plain words; empty where all is well.
+  /// What the device itself reports as wrong, as text; empty where nothing is.
   [[nodiscard]] virtual std::string state_reason(int64_t now_utime) const {
     (void)now_utime;
     return {};
@@ -84,7 +84,7 @@ class Companion {
   virtual ~Companion() = default;
   /// Called about every 50 ms; does not wait. `device` may be null.
   virtual void step(int64_t now_utime, const SensorDriver& driver, ByteSource* device) = 0;
-  /// In plain words; empty where all is well.
+  /// As text; empty where nothing is wrong.
   [[nodiscard]] virtual std::string state_reason() const = 0;
   /// What came from the network since the last call, for RAW_<raw_channel()>.
   [[nodiscard]] virtual std::vector<uint8_t> take_received() = 0;

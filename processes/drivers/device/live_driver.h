@@ -21,7 +21,7 @@ class LiveDriver {
   /// A last heartbeat.
   void stop();
 
-  /// In plain words what is the matter with the device; empty where all is well.
+  /// What is wrong with the device, as text; empty where nothing is.
   [[nodiscard]] std::string state_reason();
   [[nodiscard]] std::string device_name() const { return session_.name(); }
   /// How often the device was opened.

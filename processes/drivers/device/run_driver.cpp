@@ -17,7 +17,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr auto kPatience = std::chrono::milliseconds(50);
+constexpr auto kPollTimeout = std::chrono::milliseconds(50);
 
 class LogOutputs : public SensorOutputs {
  public:
@@ -40,20 +40,20 @@ void run_live(const CommandLine& arguments, const DriverSetup& setup) {
   ServiceNotifier service;
   service.ready("on " + arguments.bus);
   const auto say = [&](const std::string& text) { std::cerr << setup.name << ": " << text << std::endl; };
-  std::string said;
+  std::string reported;
   int64_t openings = 0;
-  while (!stop_requested() && driver.step(kPatience)) {
+  while (!stop_requested() && driver.step(kPollTimeout)) {
     service.alive();
     // At once: who uses a pseudo-terminal of ours must learn its name before a byte can come.
     if (driver.openings() != openings) {
       say("opened " + driver.device_name());
-      said.clear();
+      reported.clear();
     }
     openings = driver.openings();
     const std::string state_reason = driver.state_reason();
     const std::string kind = state_reason.substr(0, state_reason.find(';'));
-    if (kind == said) continue;
-    said = kind;
+    if (kind == reported) continue;
+    reported = kind;
     say(state_reason.empty() ? driver.device_name() + ": bytes come" : state_reason);
   }
   service.stopping();

@@ -18,7 +18,7 @@ struct DriverProgram {
   std::function<DriverSetup(const std::filesystem::path& vehicle_dir, const std::string& device)> read;
 };
 
-/// The exit status: 0, or 2 for what the user can mend (said on stderr).
+/// The exit status: 0, or 2 for what the user can mend (printed to stderr).
 int run_driver(int argc, char** argv, const DriverProgram& program);
 
 struct DriverReplay {

@@ -83,7 +83,7 @@ class SerialSource : public DescriptorSource {
 /// Two readers would share the bytes between them. The lock goes with its holder, however that ends. TIOCEXCL shuts out
 /// programs that ask for no lock, but it stays with the terminal until the last one has closed it: a pseudo-terminal,
 /// whose other end stays open, would be shut to us as well when we were killed.
-void take_for_us_alone(int descriptor, const std::string& name) {
+void lock_exclusively(int descriptor, const std::string& name) {
   if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) throw SourceError(name + ": another program reads it");
   struct stat status {};
   constexpr unsigned kFirstPty = 136, kLastPty = 143;  // Linux, Documentation/admin-guide/devices.txt
@@ -100,7 +100,7 @@ int open_serial_port(const std::string& path, int baud) {
   if (descriptor < 0) throw SourceError(path + ": " + std::strerror(errno));
   try {
     make_raw(descriptor, speed, path);
-    take_for_us_alone(descriptor, path);
+    lock_exclusively(descriptor, path);
   } catch (...) {
     ::close(descriptor);
     throw;

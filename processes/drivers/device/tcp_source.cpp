@@ -15,7 +15,7 @@ namespace roadfix {
 
 namespace {
 
-constexpr int kConnectPatience_ms = 1000;
+constexpr int kConnectTimeout_ms = 1000;
 constexpr auto kSilence = std::chrono::seconds(10);
 
 /// A descriptor, or the negative errno.
@@ -28,7 +28,7 @@ int connect_to(const addrinfo& address) {
     pollfd wait{descriptor, POLLOUT, 0};
     socklen_t size = sizeof error;
     error = ETIMEDOUT;
-    if (::poll(&wait, 1, kConnectPatience_ms) > 0) ::getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &size);
+    if (::poll(&wait, 1, kConnectTimeout_ms) > 0) ::getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &size);
   }
   if (error == 0) return descriptor;
   ::close(descriptor);
@@ -57,13 +57,14 @@ int connect_to(const std::string& host, const std::string& port) {
 }  // namespace
 
 TcpSource::TcpSource(const std::string& host, const std::string& port)
-    : DescriptorSource(connect_to(host, port), "tcp:" + host + ":" + port), heard_(std::chrono::steady_clock::now()) {}
+    : DescriptorSource(connect_to(host, port), "tcp:" + host + ":" + port),
+      last_data_(std::chrono::steady_clock::now()) {}
 
 ReadState TcpSource::read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) {
   const ReadState state = DescriptorSource::read(timeout, packets);
   const auto now = std::chrono::steady_clock::now();
-  if (state == ReadState::kData) heard_ = now;
-  return state == ReadState::kNothing && now - heard_ > kSilence ? ReadState::kLost : state;
+  if (state == ReadState::kData) last_data_ = now;
+  return state == ReadState::kNothing && now - last_data_ > kSilence ? ReadState::kLost : state;
 }
 
 std::unique_ptr<ByteSource> open_tcp(const std::string& host, const std::string& port) {

@@ -14,7 +14,7 @@ class TcpSource : public DescriptorSource {
   ReadState read(std::chrono::milliseconds timeout, std::vector<Packet>& packets) override;
 
  private:
-  std::chrono::steady_clock::time_point heard_;
+  std::chrono::steady_clock::time_point last_data_;
 };
 
 }  // namespace roadfix

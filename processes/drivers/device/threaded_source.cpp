@@ -9,10 +9,10 @@
 namespace roadfix {
 
 namespace {
-constexpr auto kPatience = std::chrono::milliseconds(100);
-constexpr auto kGoodbye = std::chrono::milliseconds(300);
+constexpr auto kPollTimeout = std::chrono::milliseconds(100);
+constexpr auto kShutdownTimeout = std::chrono::milliseconds(300);
 /// Packets that wait for the driver; beyond it the source is not read, and drops what it likes.
-constexpr std::size_t kMostWaiting = 4;
+constexpr std::size_t kMaxWaiting = 4;
 
 int64_t steady_us() {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
@@ -40,7 +40,7 @@ ThreadedSource::~ThreadedSource() {
   std::unique_lock lock(shared_->mutex);
   shared_->unwanted = true;
   shared_->changed.notify_all();
-  shared_->changed.wait_for(lock, kGoodbye, [this] { return shared_->ended; });
+  shared_->changed.wait_for(lock, kShutdownTimeout, [this] { return shared_->ended; });
 }
 
 void ThreadedSource::read_all(const std::shared_ptr<Shared>& shared) {
@@ -49,12 +49,12 @@ void ThreadedSource::read_all(const std::shared_ptr<Shared>& shared) {
   while (!shared->unwanted && !shared->over) {
     lock.unlock();
     packets.clear();
-    const ReadState state = shared->source->read(kPatience, packets);
+    const ReadState state = shared->source->read(kPollTimeout, packets);
     lock.lock();
     std::move(packets.begin(), packets.end(), std::back_inserter(shared->waiting));
     if (state == ReadState::kEnd || state == ReadState::kLost) shared->over = state;
     shared->changed.notify_all();
-    shared->changed.wait(lock, [&] { return shared->unwanted || shared->waiting.size() < kMostWaiting; });
+    shared->changed.wait(lock, [&] { return shared->unwanted || shared->waiting.size() < kMaxWaiting; });
   }
   lock.unlock();
   shared->source.reset();  // before anybody opens the device again

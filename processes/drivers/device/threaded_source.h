@@ -1,5 +1,5 @@
 /// A source whose read() may block for much longer than it is asked to wait (OpenCV on a camera that hangs: ten
-/// seconds): it is read in a thread of its own, so that whoever drives it goes on, tells of the silence and feeds its
+/// seconds): it is read in a thread of its own, so that whoever drives it goes on, reports the silence and feeds its
 /// watchdog.
 #pragma once
 

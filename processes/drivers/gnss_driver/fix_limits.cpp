@@ -9,7 +9,7 @@ namespace roadfix {
 
 namespace {
 
-// Wide: what is doubtful is the estimators' to judge. Here goes only what no road and no receiver has.
+// Wide: what is improbable is left to the estimators. Here goes only what no road and no receiver has.
 constexpr double kLowest_m = -1000.0, kHighest_m = 20'000.0;
 constexpr double kMaxStd_m = 1e7;  // u-blox says 4.3e6 where it knows nothing
 constexpr double kMaxSpeed_mps = 1000.0, kMaxSpeedStd_mps = 1e7;

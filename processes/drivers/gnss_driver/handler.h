@@ -101,7 +101,7 @@ class GnssDriver : public SensorDriver {
   [[nodiscard]] std::optional<std::string> position_for_caster(int64_t now_utime) const;
 
  private:
-  struct Fate {
+  struct SentenceCounts {
     int64_t used = 0;
     int64_t refused = 0;
   };
@@ -125,7 +125,7 @@ class GnssDriver : public SensorDriver {
   GnssEpochs epochs_;
   std::optional<int64_t> ubx_seen_us_;  ///< when the last NAV-PVT came: NMEA beside it says the same again
   std::optional<double> pdop_;
-  Fate ubx_, nmea_;
+  SentenceCounts ubx_, nmea_;
   int64_t published_ = 0, late_ = 0, newest_utime_ = 0;
   std::optional<Geodetic> last_position_;
 };

@@ -12,7 +12,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr auto kPatience = std::chrono::milliseconds(100);
+constexpr auto kPollTimeout = std::chrono::milliseconds(100);
 constexpr std::chrono::duration<double> kFirstPause(1.0), kLongestPause(60.0);
 /// What waits for a device that takes nothing; older corrections are worthless.
 constexpr std::size_t kMaxWaiting = std::size_t{1} << 16;
@@ -43,7 +43,7 @@ NtripLink::~NtripLink() {
   thread_.join();
 }
 
-void NtripLink::say_trouble(const std::string& text) {
+void NtripLink::set_state_reason(const std::string& text) {
   const std::lock_guard lock(mutex_);
   state_reason_ = text;
 }
@@ -53,19 +53,19 @@ void NtripLink::work() {
   while (!stop_) {
     const auto begin = SteadyClock::now();
     try {
-      talk();
+      run_session();
     } catch (const SourceError& e) {
-      say_trouble(std::string("NTRIP: ") + e.what());
+      set_state_reason(std::string("NTRIP: ") + e.what());
     }
     if (SteadyClock::now() - begin > kLongestPause) pause = kFirstPause;  // it had worked
     const auto until = SteadyClock::now() + pause;
-    while (!stop_ && SteadyClock::now() < until) std::this_thread::sleep_for(kPatience);
+    while (!stop_ && SteadyClock::now() < until) std::this_thread::sleep_for(kPollTimeout);
     pause = std::min(2.0 * pause, kLongestPause);
   }
 }
 
 /// One connection, until it ends.
-void NtripLink::talk() {
+void NtripLink::run_session() {
   TcpSource caster(config_.host, std::to_string(config_.port));
   const auto write = [&](const std::string& text) {
     return caster.write({reinterpret_cast<const uint8_t*>(text.data()), text.size()});
@@ -76,8 +76,8 @@ void NtripLink::talk() {
   SteadyClock::time_point next_position{};
   while (!stop_ && answer.state() != NtripAnswer::State::kRefused) {
     packets.clear();
-    if (caster.read(kPatience, packets) == ReadState::kLost) {
-      return say_trouble("NTRIP: " + caster.name() + ": went away");
+    if (caster.read(kPollTimeout, packets) == ReadState::kLost) {
+      return set_state_reason("NTRIP: " + caster.name() + ": went away");
     }
     for (const Packet& packet : packets) {
       const std::vector<uint8_t> frames = answer.feed(steady_us(), packet.bytes);
@@ -86,7 +86,7 @@ void NtripLink::talk() {
       corrections_.insert(corrections_.end(), frames.begin(), frames.end());
     }
     if (answer.state() != NtripAnswer::State::kStreaming) continue;
-    say_trouble("");
+    set_state_reason("");
     if (config_.send_position <= 0.0 || SteadyClock::now() < next_position) continue;
     std::string position;
     {
@@ -97,7 +97,7 @@ void NtripLink::talk() {
     next_position = SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(
                                              std::chrono::duration<double>(config_.send_position));
   }
-  if (answer.state() == NtripAnswer::State::kRefused) say_trouble("NTRIP: " + caster.name() + ": " + answer.why());
+  if (answer.state() == NtripAnswer::State::kRefused) set_state_reason("NTRIP: " + caster.name() + ": " + answer.why());
 }
 
 void NtripLink::step(int64_t now_utime, const SensorDriver& driver, ByteSource* device) {
@@ -109,14 +109,14 @@ void NtripLink::step(int64_t now_utime, const SensorDriver& driver, ByteSource* 
     corrections = std::exchange(corrections_, {});
     received_.insert(received_.end(), corrections.begin(), corrections.end());
   }
-  if (device != nullptr && !corrections.empty()) device_refuses_ = !device->write(corrections);
+  if (device != nullptr && !corrections.empty()) device_rejects_ = !device->write(corrections);
 }
 
 std::vector<uint8_t> NtripLink::take_received() { return std::exchange(received_, {}); }
 
 std::string NtripLink::state_reason() const {
   const std::lock_guard lock(mutex_);
-  return state_reason_.empty() && device_refuses_ ? "NTRIP: the receiver takes no corrections" : state_reason_;
+  return state_reason_.empty() && device_rejects_ ? "NTRIP: the receiver takes no corrections" : state_reason_;
 }
 
 }  // namespace roadfix

@@ -25,8 +25,8 @@ class NtripLink : public Companion {
 
  private:
   void work();
-  void talk();
-  void say_trouble(const std::string& text);
+  void run_session();
+  void set_state_reason(const std::string& text);
 
   NtripConfig config_;
   std::string request_;
@@ -35,7 +35,7 @@ class NtripLink : public Companion {
   std::vector<uint8_t> corrections_;  ///< received, not yet for the device
   std::vector<uint8_t> received_;     ///< the same, not yet taken
   std::string position_;              ///< the newest, for the caster
-  bool device_refuses_ = false;
+  bool device_rejects_ = false;
   std::atomic<bool> stop_ = false;
   std::thread thread_;
 };

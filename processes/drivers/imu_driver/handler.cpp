@@ -13,8 +13,8 @@ namespace roadfix {
 
 namespace {
 
-/// For which a clipped sample is told: long enough for a heartbeat, and for eyes.
-constexpr int64_t kTold_us = 3'000'000;
+/// For which a clipped sample is reported: long enough for a heartbeat and a reader.
+constexpr int64_t kReported_us = 3'000'000;
 
 Eigen::Vector3d vector(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
 
@@ -245,7 +245,7 @@ void ImuDriver::take_nav(const SbgEkfNav& nav, int64_t read_utime, SensorOutputs
 }
 
 std::string ImuDriver::state_reason(int64_t now_utime) const {
-  if (clipped_ == 0 || now_utime - clipped_utime_ > kTold_us) return {};
+  if (clipped_ == 0 || now_utime - clipped_utime_ > kReported_us) return {};
   return "the motion is beyond the IMU's range: " + std::to_string(clipped_) + " samples are clipped";
 }
 

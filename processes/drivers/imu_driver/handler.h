@@ -40,7 +40,7 @@ class ImuDriver : public SensorDriver {
   void opened(int stream) override;
   void take(int stream, int64_t read_utime, std::span<const uint8_t> bytes, SensorOutputs& outputs) override;
   [[nodiscard]] std::vector<StreamCounters> counters() const override;
-  /// Motion beyond the sensor's range: such samples are published (imu_t has no place to mark them), and told here.
+  /// Motion beyond the sensor's range: such samples are published (imu_t has no place to mark them), and reported here.
   [[nodiscard]] std::string state_reason(int64_t now_utime) const override;
 
  private:

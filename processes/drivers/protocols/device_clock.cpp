@@ -14,7 +14,7 @@ constexpr int64_t kBackwards_us = 1'000'000;
 constexpr int kStraysForRestart = 3;
 /// No path becomes that much slower for good: a serial port's buffer of 4 kB holds 0.35 s at 115200 baud.
 constexpr int64_t kLate_us = 500'000;
-constexpr int64_t kLateForGood_us = 10'000'000;
+constexpr int64_t kPersistentlyLate_us = 10'000'000;
 /// Beyond it sums would overflow; no clock shows it.
 constexpr int64_t kLimit_us = int64_t{1} << 61;
 /// After a longer silence the two clocks' distance is learnt from what comes, not from how far they may have parted.
@@ -65,7 +65,7 @@ bool DeviceClock::was_set_back(int64_t seen_us, int64_t read_utime) {
     least_late_us_ = seen_us;
   }
   least_late_us_ = std::min(least_late_us_, seen_us);
-  if (read_utime - *late_since_us_ < kLateForGood_us) return false;
+  if (read_utime - *late_since_us_ < kPersistentlyLate_us) return false;
   late_since_us_.reset();
   return true;
 }

@@ -4,8 +4,8 @@
 
 namespace roadfix {
 
-Framer::Framer(std::vector<ProbeFrame> protocols, int64_t patience_us)
-    : protocols_(std::move(protocols)), patience_us_(patience_us), counters_(protocols_.size()) {}
+Framer::Framer(std::vector<ProbeFrame> protocols, int64_t timeout_us)
+    : protocols_(std::move(protocols)), timeout_us_(timeout_us), counters_(protocols_.size()) {}
 
 void Framer::feed(int64_t t_us, std::span<const uint8_t> bytes) {
   const bool was_waiting = waiting_bytes() > 0;
@@ -31,7 +31,7 @@ std::optional<Frame> Framer::next() {
       if (probe.fit == Fit::kBadChecksum) ++counters_[i].bad_checksums;
       if (probe.fit == Fit::kIncomplete) incomplete = true;
     }
-    if (incomplete && now_us_ - begin_since_us_ <= patience_us_) return std::nullopt;
+    if (incomplete && now_us_ - begin_since_us_ <= timeout_us_) return std::nullopt;
     skip_byte();
   }
   return std::nullopt;

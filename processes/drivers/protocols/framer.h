@@ -1,4 +1,4 @@
-/// Cuts a device's stream of bytes into frames, in whatever pieces the bytes come, and finds its way again after
+/// Cuts a device's stream of bytes into frames, in whatever pieces the bytes come, and synchronises again after
 /// garbage: behind a wrong checksum the search goes on one byte further, so no garbage costs a whole frame that follows
 /// it. Counts what it refuses. No I/O and no clock.
 #pragma once
@@ -12,7 +12,7 @@ namespace roadfix {
 
 enum class Fit {
   kNoFrame,      ///< no frame of this protocol begins here
-  kIncomplete,   ///< one may begin here; more bytes will tell
+  kIncomplete,   ///< one may begin here; more bytes decide
   kBadChecksum,  ///< one seems to begin here, but its checksum is wrong
   kFrame
 };
@@ -32,10 +32,10 @@ struct Frame {
 
 class Framer {
  public:
-  /// A beginning that is not completed for `patience_us` was none: it may not hold up the frames behind it for longer.
-  static constexpr int64_t kDefaultPatience_us = 300'000;
+  /// A beginning that is not completed for `timeout_us` was none: it may not hold up the frames behind it for longer.
+  static constexpr int64_t kDefaultTimeout_us = 300'000;
 
-  explicit Framer(std::vector<ProbeFrame> protocols, int64_t patience_us = kDefaultPatience_us);
+  explicit Framer(std::vector<ProbeFrame> protocols, int64_t timeout_us = kDefaultTimeout_us);
 
   /// More bytes, read at `t_us`.
   void feed(int64_t t_us, std::span<const uint8_t> bytes);
@@ -60,7 +60,7 @@ class Framer {
   void skip_byte();
 
   std::vector<ProbeFrame> protocols_;
-  int64_t patience_us_;
+  int64_t timeout_us_;
   std::vector<Counters> counters_;
   std::vector<uint8_t> buffer_;
   std::size_t begin_ = 0;  ///< of what is not yet cut

@@ -14,7 +14,7 @@ namespace {
 constexpr double kKnotsPerMps = 3600.0 / 1852.0;
 constexpr double kKmphPerMps = 3.6;
 constexpr int64_t kMinuteUnits = 1'000'000;  ///< written digits of a minute: 1.9 mm; more make GGA longer than 82
-constexpr int kMostSatellites = 99;          ///< two digits
+constexpr int kMaxSatellites = 99;           ///< two digits
 constexpr double kLargest = 99'999.0;        ///< what has more digits than a sentence has room for is not known
 
 /// Rounded to milliseconds, the digits written.
@@ -70,7 +70,7 @@ std::string position_fields(const NmeaPose& pose) {
   return angle(pose.position->lat_deg, 2, 'N', 'S') + "," + angle(pose.position->lon_deg, 3, 'E', 'W');
 }
 
-/// A position that cannot be written is none, whatever the quality said.
+/// A position that cannot be written is none, whatever the quality.
 NmeaQuality quality(const NmeaPose& pose) { return has_position(pose) ? pose.quality : NmeaQuality::kNone; }
 
 char mode(const NmeaPose& pose) {
@@ -108,7 +108,7 @@ std::string sentence(const std::string& talker, const std::string& rest) {
 std::string write_gga(const NmeaPose& pose, const std::string& talker) {
   const auto satellites = with_position(pose, pose.num_satellites);
   const std::string count =
-      satellites && *satellites >= 0 ? fmt::format("{:02}", std::min(*satellites, kMostSatellites)) : "";
+      satellites && *satellites >= 0 ? fmt::format("{:02}", std::min(*satellites, kMaxSatellites)) : "";
   // Units stand also where the number is unknown, as receivers write it.
   return sentence(talker,
                   fmt::format("GGA,{},{},{},{},,{},M,{},M,{},", time_field(pose.t_us), position_fields(pose),

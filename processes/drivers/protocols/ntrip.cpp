@@ -14,7 +14,7 @@ namespace roadfix {
 namespace {
 
 constexpr std::size_t kMaxChunk = std::size_t{1} << 20;
-constexpr int64_t kRtcmPatience_us = 5'000'000;  // a caster may pause within a frame
+constexpr int64_t kRtcmTimeout_us = 5'000'000;  // a caster may pause within a frame
 
 std::string lower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -50,11 +50,11 @@ std::string ntrip_request(const NtripRequest& r) {
   return text + "Connection: close\r\n\r\n";
 }
 
-NtripAnswer::NtripAnswer() : framer_({probe_rtcm}, kRtcmPatience_us) {}
+NtripAnswer::NtripAnswer() : framer_({probe_rtcm}, kRtcmTimeout_us) {}
 
 void NtripAnswer::refuse(const std::string& why) {
   state_ = State::kRefused;
-  why_ = why;
+  reason_ = why;
   head_.clear();
 }
 

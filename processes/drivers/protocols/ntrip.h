@@ -1,4 +1,4 @@
-/// NTRIP, corrections for GNSS receivers over HTTP: what is said to a caster and what it answers, without the socket.
+/// NTRIP, corrections for GNSS receivers over HTTP: requests to a caster and its answers, without the socket.
 /// Facts: RTCM 10410.1 (version 2.0: HTTP/1.1, perhaps chunked) and version 1.0 (answer "ICY 200 OK"). No TLS.
 #pragma once
 
@@ -36,8 +36,8 @@ class NtripAnswer {
   std::vector<uint8_t> feed(int64_t t_us, std::span<const uint8_t> bytes);
 
   [[nodiscard]] State state() const { return state_; }
-  /// Why the caster refused, in its words or ours.
-  [[nodiscard]] const std::string& why() const { return why_; }
+  /// Why the caster refused, in its text or ours.
+  [[nodiscard]] const std::string& why() const { return reason_; }
   [[nodiscard]] int64_t frames() const { return framer_.frames(0); }
   [[nodiscard]] int64_t bad_checksums() const { return framer_.bad_checksums(0); }
   [[nodiscard]] int64_t skipped_bytes() const { return framer_.skipped_bytes(); }
@@ -52,7 +52,7 @@ class NtripAnswer {
   std::vector<uint8_t> unchunk();
 
   State state_ = State::kWaiting;
-  std::string why_;
+  std::string reason_;
   std::vector<uint8_t> head_;  ///< received, but not yet understood
   bool version1_ = false;
   bool chunked_ = false;

@@ -83,11 +83,11 @@ void WheelDriver::take_frame(const CanFrame& frame, int64_t read_utime, SensorOu
   for (Tracked& wheel : speeds_) speed = update(wheel, frame, *utime) || speed;
   if (ours || speed) ++used_;
   const bool whole = std::all_of(speeds_.begin(), speeds_.end(),
-                                 [&](const Tracked& wheel) { return wheel.fresh && young(wheel, *utime); });
+                                 [&](const Tracked& wheel) { return wheel.fresh && is_recent(wheel, *utime); });
   if (speed && whole) publish(*utime, outputs);
 }
 
-bool WheelDriver::young(const Tracked& signal, int64_t utime) const {
+bool WheelDriver::is_recent(const Tracked& signal, int64_t utime) const {
   return static_cast<double>(utime - signal.utime) <= config_.max_age * 1e6;
 }
 
@@ -127,7 +127,7 @@ void WheelDriver::publish(int64_t utime, SensorOutputs& outputs) {
     if (contains(config_.forward, *direction_->raw)) sample.direction = WheelDirection::kForward;
     if (contains(config_.reverse, *direction_->raw)) sample.direction = WheelDirection::kReverse;
   }
-  if (yaw_rate_ && yaw_rate_->utime != 0 && young(*yaw_rate_, utime)) {
+  if (yaw_rate_ && yaw_rate_->utime != 0 && is_recent(*yaw_rate_, utime)) {
     const std::optional<double>& value = yaw_rate_->value;
     if (value && std::abs(*value) <= config_.max_yaw_rate) sample.yaw_rate = value;
   }

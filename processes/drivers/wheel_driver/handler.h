@@ -93,7 +93,7 @@ class WheelDriver : public SensorDriver {
   /// The wheels' newest values as speeds of `sample`; false where one is not available, or the first of its counter.
   bool take_speeds(WheelSample& sample);
   bool count_speeds(WheelSample& sample);
-  [[nodiscard]] bool young(const Tracked& signal, int64_t utime) const;
+  [[nodiscard]] bool is_recent(const Tracked& signal, int64_t utime) const;
 
   WheelDriverConfig config_;
   Framer framer_;

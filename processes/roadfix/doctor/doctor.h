@@ -1,5 +1,5 @@
 /// What a machine needs before the bus works on it: each check says what it saw and, where something is wrong, the
-/// command that mends it (test/bus/mends.sh breaks each thing and runs what is said), or what a person has to decide.
+/// command that mends it (test/bus/mends.sh breaks each thing and runs the command), or what a person has to decide.
 ///
 /// Checks read /proc and /sys below `root`, so that tests hand in a made tree; only the loop-back check opens a bus.
 #pragma once
@@ -16,7 +16,7 @@ enum class Level { kOk, kWarning, kError };
 struct Finding {
   Level level = Level::kOk;
   std::string check;        ///< for example "multicast route"
-  std::string seen;         ///< what was found, in plain words
+  std::string seen;         ///< what was found, as text
   std::string mend;         ///< a shell command for root, from the repository's folder; empty where none mends it
   std::string advice = {};  ///< where no command can mend it: what to look at or to decide
 };
@@ -58,7 +58,7 @@ Finding check_clock();
 /// Space left where recordings go.
 Finding check_disk(const std::filesystem::path& folder, std::uint64_t wanted_bytes);
 
-/// Whether --realtime will be granted; the second form is told who asks and with which limits (RLIMIT_RTPRIO, bytes of
+/// Whether --realtime will be granted; the second form is given who asks and with which limits (RLIMIT_RTPRIO, bytes of
 /// RLIMIT_MEMLOCK).
 Finding check_realtime();
 Finding check_realtime(bool root, std::uint64_t priority_limit, std::uint64_t memory_limit);

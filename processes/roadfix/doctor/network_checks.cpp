@@ -16,7 +16,7 @@ namespace {
 /// One raw stereo pair of KITTI's size fits with room for a burst (lcm_facts.md, 0.1: 2 MB in the URL lost nothing at
 /// 100 Hz).
 constexpr long kReceiveBufferBytes = 4'194'304;
-/// lcm_facts.md, 2.3: 64 MB of reassembly, 1 s of patience.
+/// lcm_facts.md, 2.3: 64 MB of reassembly, 1 s of time-out.
 constexpr long kReassemblyBytes = 67'108'864;
 constexpr long kReassemblySeconds = 1;
 constexpr int kLoopbackTimeoutMs = 1500;

@@ -84,7 +84,7 @@ class StreamBuilder {
     stream_.reasons.resize(kept);
     stream_.latencies.resize(kept);
     if (!stream_.anchor && !stream_.local_frame) stream_.anchor = last_anchor_;  // all are invalid
-    // A replay stamps each event with its message's own time: there is no latency to tell.
+    // A replay stamps each event with its message's own time: there is no latency to measure.
     if (std::all_of(stream_.latencies.begin(), stream_.latencies.end(), [](double l) { return l == 0.0; })) {
       stream_.latencies.clear();
     }
@@ -202,7 +202,7 @@ class LogCollector {
   std::map<std::string, Noted> noted_;
 };
 
-/// The point of the vehicle in body axes, where the calibration tells.
+/// The point of the vehicle in body axes, where the calibration has it.
 std::optional<Eigen::Vector3d> point_of(int8_t origin, const Calibration& calibration) {
   const bool imu_body = calibration.body_origin.value_or(BodyOrigin::kImu) == BodyOrigin::kImu;
   if (origin == pose_t::ORIGIN_IMU && imu_body) return Eigen::Vector3d::Zero();

@@ -57,7 +57,7 @@ void move_to_anchor(PoseStream& stream, const Geodetic& anchor);
 /// The reference of a log, with what may be scored of it. Throws where there is none.
 Reference reference_of(const EvaluationLog& log, const std::filesystem::path& path);
 
-/// From the stream's point of the vehicle to the reference's, vehicle axes; a note where the calibration does not tell.
+/// From the stream's point of the vehicle to the reference's, vehicle axes; a note where the calibration has none.
 Eigen::Vector3d lever_arm_between(int8_t from_origin, int8_t to_origin, const Calibration& calibration,
                                   std::vector<std::string>& notes);
 

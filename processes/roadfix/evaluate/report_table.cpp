@@ -148,7 +148,7 @@ std::string aligned_mean(const ChannelScore& c, Alignment alignment) {
 }
 
 /// Tables 1 and 2 of Lee et al. (2025) for this drive. Its VIO was aligned to the reference by a similarity before it was scored;
-/// a car has no reference, so that what was published stands first, and the paper's way beside it by its name.
+/// a car has no reference, so that what was published stands first, and the paper's definition beside it by its name.
 std::string paper_tables(const EvaluationReport& report) {
   std::string text = fmt::format("\n{:<14}{:>14}{:>14}{:>10}{:>10}{:>10}{:>9}{:>12}{:>12}\n", "Lee 2025", "ATE mean m",
                                  "ATE sim3 m", "RPE m", "TSE m", "RCT s", "MPA %", "balanced %", "always CA %");

@@ -7,7 +7,7 @@
 namespace roadfix {
 namespace {
 
-/// As far as its leading bytes tell how many follow.
+/// By the number of following bytes that its leading bytes declare.
 bool is_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto code = static_cast<unsigned char>(text[i]);

@@ -12,7 +12,7 @@ namespace roadfix {
 /// One type, compiled: writing a message looks up no name.
 class LcmJson {
  public:
-  /// Without the byte arrays where `leave_out_bytes` says that they go another way.
+  /// Without the byte arrays where `leave_out_bytes` is set: they are exported elsewhere.
   LcmJson(const Schema& schema, const std::string& type, bool leave_out_bytes);
 
   /// The JSON schema, as MCAP's encoding "jsonschema" wants it.

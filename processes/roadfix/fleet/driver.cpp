@@ -73,7 +73,7 @@ std::chrono::milliseconds look_every(std::size_t tasks) {
   return tasks < 1000 ? std::chrono::milliseconds(200) : std::chrono::milliseconds(5000);
 }
 
-/// Until the engine has nothing left. What the user's interruption or a full disk stopped is said by the caller.
+/// Until the engine has nothing left. What the user's interruption or a full disk stopped is reported by the caller.
 void watch(Engine& engine, FleetProgress& progress, std::size_t tasks, bool shown) {
   ProgressLine line("fleet", shown);
   Clock::time_point next_look;

@@ -28,7 +28,7 @@ void plan_fleet(FleetRequest request, const RunFolder& run);
 /// The plan with the configurations and the program as they are now, written where that differs.
 FleetPlan renewed_plan(const RunFolder& run);
 
-/// Runs these tasks and tells how it went; returns the exit status. Detached engines: kOk as soon as they have it.
+/// Runs these tasks and prints how it went; returns the exit status. Detached engines: kOk as soon as they have it.
 int run_fleet(const RunFolder& run, const FleetPlan& plan, const std::vector<std::size_t>& indices,
               const EngineOptions& options);
 

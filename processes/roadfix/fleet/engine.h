@@ -46,7 +46,7 @@ class Engine {
   virtual void start() = 0;
   /// False once nothing runs or waits any more. Call it often.
   virtual bool step() = 0;
-  /// Ends what runs, starts nothing new; step() tells when all is over.
+  /// Ends what runs, starts nothing new; step() returns when all is over.
   virtual void stop() = 0;
   /// The work goes on without this process.
   [[nodiscard]] virtual bool detached() const { return false; }

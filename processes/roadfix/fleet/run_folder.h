@@ -56,7 +56,7 @@ struct TaskKey {
   bool operator==(const TaskKey&) const = default;
 };
 
-/// A result.json up to its figures: enough to tell what is done.
+/// A result.json up to its figures: enough to know what is done.
 struct ResultHead {
   bool ok = false;
   std::string reason;  ///< of a failure

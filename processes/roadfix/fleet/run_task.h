@@ -1,4 +1,4 @@
-/// One task in a process of its own, so that whatever ends it costs it alone and is said in its result.
+/// One task in a process of its own, so that whatever ends it costs it alone and is reported in its result.
 #pragma once
 
 #include <cstddef>

@@ -15,7 +15,7 @@ struct ImageHeader {
   int height_px = 0;
 };
 
-/// Nothing where the bytes are neither JPEG nor PNG, or end before the size is told.
+/// Nothing where the bytes are neither JPEG nor PNG, or end before the size.
 std::optional<ImageHeader> read_image_header(std::span<const uint8_t> bytes);
 
 /// The same of a file; ConfigError where it is missing, or no picture.

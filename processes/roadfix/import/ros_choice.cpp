@@ -18,7 +18,7 @@ bool has_any(const std::string& name, const Words& words) {
   return std::any_of(words.begin(), words.end(), [&](const char* w) { return lower.find(w) != std::string::npos; });
 }
 
-/// How a role's topics are told.
+/// How a role's topics are recognised.
 struct Role {
   std::string name;
   std::set<RosKind> kinds;

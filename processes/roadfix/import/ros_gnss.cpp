@@ -69,7 +69,7 @@ void RosTopic::take_gps_fix(int64_t t_us) {
   const double course = number("track") * kDegree, speed = number("speed");
   if (speed != 0.0 || course != 0.0) {
     const Eigen::Vector3d enu(speed * std::sin(course), speed * std::cos(course), number("climb"));
-    constexpr double kTwoSigma = 2.0;  // err_speed is told at 95 %
+    constexpr double kTwoSigma = 2.0;  // err_speed is given at 95 %
     fix.velocity =
         GnssVelocity{enu, Eigen::Matrix3d::Identity() * std::pow(std::isfinite(sigma) ? sigma / kTwoSigma : 0.0, 2)};
   }

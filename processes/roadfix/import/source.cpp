@@ -28,7 +28,7 @@ const std::vector<std::string>& source_formats() {
 namespace {
 
 /// What lies in a folder of a format: of each row at least one name; "*" begins a name of which the end counts. Signs
-/// are names that tell the format where a row is missing.
+/// are names that identify the format where a row is missing.
 struct Layout {
   const char* format;
   const char* called;

@@ -1,4 +1,4 @@
-/// Recordings of every supported format, told apart by what lies in their folder.
+/// Recordings of every supported format, recognised by what lies in their folder.
 #pragma once
 
 #include <filesystem>

@@ -28,7 +28,7 @@ class McapReader {
   /// `bytes` outlive it; `name` is what errors call them.
   McapReader(std::span<const uint8_t> bytes, const std::string& name);
 
-  /// The next message of a channel that was told before; nothing at the end.
+  /// The next message of a channel that was declared before; nothing at the end.
   std::optional<Message> next();
   /// A message that next() gave before.
   Message at(const McapPlace& place);

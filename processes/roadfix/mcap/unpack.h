@@ -1,4 +1,4 @@
-/// Chunks packed by zstd, lz4 (frames) and bzip2, with a size that is told beforehand and believed within limits.
+/// Chunks packed by zstd, lz4 (frames) and bzip2, with a size that is declared beforehand and used within limits.
 #pragma once
 
 #include <cstdint>

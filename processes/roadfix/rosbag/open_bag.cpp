@@ -39,7 +39,7 @@ class BagFolder : public Bag {
       const auto number = parse_integer(count->scalar);
       if (!number)
         throw ConfigError(metadata_, count->line, fmt::format("message_count = {}: is no number", count->scalar));
-      told_ = *number;
+      declared_ = *number;
     }
   }
 
@@ -55,9 +55,9 @@ class BagFolder : public Bag {
         visitor(message);
       });
     }
-    if (told_ >= 0 && found < told_) {
+    if (declared_ >= 0 && found < declared_) {
       throw ConfigError(metadata_, 0,
-                        fmt::format("tells {} messages, the files have {}: they are cut short", told_, found));
+                        fmt::format("tells {} messages, the files have {}: they are cut short", declared_, found));
     }
   }
 
@@ -68,7 +68,7 @@ class BagFolder : public Bag {
  private:
   std::string metadata_;
   std::vector<std::unique_ptr<Bag>> bags_;
-  int64_t told_ = -1;
+  int64_t declared_ = -1;
 };
 
 }  // namespace

@@ -73,12 +73,12 @@ class Ros1Bag : public Bag {
     if (head.number<uint8_t>("op") != kBagHeader) head.data.fail("the first record must be the bag's header");
     const auto index = head.number<uint64_t>("index_pos");
     if (index == 0) head.data.fail("the bag was not closed, it has no index (`rosbag reindex` makes one)");
-    Counts told{head.number<uint32_t>("conn_count"), head.number<uint32_t>("chunk_count")};
+    Counts declared{head.number<uint32_t>("conn_count"), head.number<uint32_t>("chunk_count")};
     Counts found;
     while (!cursor.at_end()) take_one(cursor, visitor, found);
-    if (found.connections != told.connections || found.chunks != told.chunks) {
+    if (found.connections != declared.connections || found.chunks != declared.chunks) {
       cursor.fail(fmt::format("the index has {} connections and {} chunks, the bag's header says {} and {}",
-                              found.connections, found.chunks, told.connections, told.chunks));
+                              found.connections, found.chunks, declared.connections, declared.chunks));
     }
   }
 

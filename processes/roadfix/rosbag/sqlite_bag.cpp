@@ -20,7 +20,7 @@ struct Close {
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
 
-/// sqlite believes its own page count only sometimes: a file that is shorter is cut.
+/// sqlite uses its own page count only sometimes: a file that is shorter is cut.
 void refuse_cut_file(const fs::path& path) {
   std::array<uint8_t, 100> head{};
   std::ifstream stream(path, std::ios::binary);

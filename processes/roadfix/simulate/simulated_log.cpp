@@ -21,7 +21,7 @@
 namespace roadfix {
 namespace {
 
-/// One encoded message on its way into the log.
+/// One encoded message for the log.
 struct Event {
   std::int64_t arrival_us;
   int channel;  // rank among messages that arrive together

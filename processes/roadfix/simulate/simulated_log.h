@@ -23,7 +23,7 @@ Calibration calibration_of(const SimulatedDrive& drive);
 /// How the drive is to be scored; each GNSS silence is an outage.
 DriveFacts facts_of(const SimulatedDrive& drive);
 
-/// Who draws the pictures, and who is told how many exposures are done.
+/// Who draws the pictures, and who is called with how many exposures are done.
 struct PictureWork {
   Executor& executor;
   std::function<void(std::size_t)> progress = [](std::size_t) {};

@@ -14,7 +14,7 @@ namespace roadfix {
 
 class SimulatedPictures {
  public:
-  /// `progress` is told the number of exposures taken so far. All outlive this.
+  /// `progress` is given the number of exposures taken so far. All outlive this.
   SimulatedPictures(const SimulatedDrive& drive, Executor& executor, std::function<void(std::size_t)> progress);
 
   /// The message of drive.pictures_left[index] or pictures_right[index], without run and seq; each is given once.

@@ -90,7 +90,7 @@ class Supervisor {
   /// Starts what is due, reaps what died. Call every few 10 ms.
   void step();
 
-  /// Stops everything, last started first: SIGINT, after the patience SIGTERM, then SIGKILL. Returns when all are gone.
+  /// Stops everything, last started first: SIGINT, after the time-out SIGTERM, then SIGKILL. Returns when all are gone.
   void stop();
 
   [[nodiscard]] int running() const;
