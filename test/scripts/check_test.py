@@ -80,6 +80,36 @@ class Build(unittest.TestCase):
         self.assertNotIn("Building", done.stderr)
 
 
+class Demo(unittest.TestCase):
+    def demo(self, files_in_cache):
+        """scripts/demo in a folder of its own, with a build that says what it was asked for and makes a tool that does nothing."""
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for path, text in {
+                "scripts/demo": (ROOT / "scripts/demo").read_text(),
+                "scripts/stopwatch.sh": (ROOT / "scripts/stopwatch.sh").read_text(),
+                "scripts/setup": "#!/bin/sh\n",
+                "scripts/build": "#!/bin/sh\necho \"asked for: $*; cache off: ${CCACHE_DISABLE:-no}\"\n",
+                "build/release/bin/roadfix": "#!/bin/sh\necho \"roadfix $1\"\n",
+                "bin/ccache": f"#!/bin/sh\nprintf 'cache_miss\\t7\\nfiles_in_cache\\t{files_in_cache}\\n'\n",
+            }.items():
+                (folder / path).parent.mkdir(parents=True, exist_ok=True)
+                (folder / path).write_text(text)
+                (folder / path).chmod(0o755)
+            environment = {key: value for key, value in os.environ.items() if key != "CCACHE_DISABLE"}
+            environment["PATH"] = f"{folder / 'bin'}:{environment['PATH']}"
+            return subprocess.run(["bash", "scripts/demo"], cwd=folder, env=environment, capture_output=True, text=True)
+
+    def test_only_the_tool_is_built_and_the_time_is_told(self):
+        done = self.demo(5)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("asked for: release roadfix; cache off: no\n", done.stdout)
+        self.assertRegex(done.stdout, r"roadfix evaluate\nscripts/demo: [0-9.]+ min: packages [0-9.]+ min, build [0-9.]+ min, run [0-9.]+ min\n$")
+
+    def test_an_empty_compiler_cache_is_left_alone(self):
+        self.assertIn("cache off: 1\n", self.demo(0).stdout)
+
+
 class Stopwatch(unittest.TestCase):
     def test_the_parts_are_told_in_minutes(self):
         script = f"source {ROOT}/scripts/stopwatch.sh; sleep 0.1; spend packages; spend 'build and link'; spent it"
