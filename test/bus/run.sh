@@ -12,6 +12,8 @@ fi
 folder=$(mktemp -d); trap 'kill $(jobs -p) 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
 cd "$folder"
 fail() { echo "run: $*"; cat said doctor 2>/dev/null; exit 1; }
+trap 'echo "run: line $LINENO: $BASH_COMMAND ended with $?"; cat said err doctor 2>/dev/null' ERR
+await() { for _ in $(seq 600); do eval "$1" && return; sleep 0.1; done; fail "after a minute still not: $1"; }  # however slow the machine
 export LCM_DEFAULT_URL='udpm://239.255.76.67:7667?ttl=0'
 
 if "$bin/roadfix" doctor >doctor; then fail 'doctor finds nothing in a namespace without a route'; fi
@@ -26,12 +28,12 @@ cp -r "$config" vehicle
 printf 'min_free_gib: 0\n' >vehicle/recorder.yaml
 "$bin/roadfix" log cut "$log" --to-s 14 --out cut.lcm >/dev/null
 "$bin/roadfix" run vehicle >said 2>err & run=$!
-for _ in $(seq 600); do [[ $(grep -c started said) -ge $(grep -c 'name:' vehicle/run.yaml) ]] && break; sleep 0.1; done
+await '[[ $(grep -c started said) -ge $(grep -c "name:" vehicle/run.yaml) ]]'
 source "$here/listeners.sh"
 await_listeners "$(grep -c 'name:' vehicle/run.yaml)"
 # README's page is that of the monitor which runs; another one takes another port, is silent, and says both.
 "$bin/monitor" --config vehicle --plain >/dev/null 2>second & second=$!
-for _ in $(seq 600); do grep -q 'only shows' second && break; sleep 0.1; done
+await 'grep -q "only shows" second'
 grep -q '^monitor: dashboard: cannot listen on 127.0.0.1:8420: Address already in use (monitor, process [0-9]*); this one.s page is http://127.0.0.1:8421/$' second ||
   fail "a second monitor: $(cat second)"
 grep -q 'another monitor publishes HEALTH here; this one only shows' second || fail "a second monitor: $(cat second)"
@@ -40,9 +42,10 @@ status=0; "$bin/monitor" --plain --listen 127.0.0.1:8420 2>third >/dev/null || s
 lcm-logplayer cut.lcm >/dev/null 2>&1 & player=$!
 sleep 5
 kill -KILL "$(sed -n 's/^gnss_ins_ekf started, process //p' said)"
-wait $player
+wait $player || fail "the player ended with $?"
+await '[[ $(grep -c "^gnss_ins_ekf started" said) -eq 2 ]]'
 sleep 0.5
-kill $second
+kill $second || fail "the second monitor is gone: $(cat second)"
 kill -INT $run
 wait $run || fail "ended with $?"
 grep -q 'gnss_ins_ekf was killed by signal 9 .*starts again in' said || fail 'the death was not said'
