@@ -34,7 +34,7 @@ RoughRoad::RoughRoad(double roughness_m3, double wheelbase, double track_width, 
   constexpr double kStep = std::numbers::ln2 / kWavesPerOctave;
   for (int i = 0; i < kOctaves * kWavesPerOctave; ++i) {
     const double cycles = kLongest * std::exp2((i + random.uniform()) / kWavesPerOctave);
-    const double variance = 0.5 * kPi * roughness_m3 * kReference * kReference / cycles * kStep;  // (S.3)
+    const double variance = 0.5 * kPi * roughness_m3 * kReference * kReference / cycles * kStep;  // (D.1.3)
     const double direction = 2.0 * kPi * random.uniform();
     const double phase = 2.0 * kPi * random.uniform();
     waves_.push_back({2.0 * kPi * cycles * Eigen::Vector2d(std::cos(direction), std::sin(direction)),
@@ -42,7 +42,7 @@ RoughRoad::RoughRoad(double roughness_m3, double wheelbase, double track_width, 
   }
 }
 
-BodyMotion RoughRoad::at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const {
+BodyDisplacement RoughRoad::at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const {
   const Eigen::Vector2d forward(std::cos(heading), std::sin(heading));
   const Eigen::Vector2d left(-forward.y(), forward.x());
   double rear = 0.0, front = 0.0, lean = 0.0;

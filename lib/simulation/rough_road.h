@@ -1,4 +1,4 @@
-/// What a rough road does to a car's body: heave, pitch and roll about the smooth terrain, (S.3) to (S.5) of MODEL.md.
+/// What a rough road does to a car's body: heave, pitch and roll about the smooth terrain, (D.1.3) to (D.1.6) of MODEL.md.
 ///
 /// A function of place, heading and velocity alone, smooth in all of them: the same place passed at the same speed has
 /// the same bump, and a car that stands stands exactly still.
@@ -13,7 +13,7 @@
 namespace roadfix {
 
 /// The body against a smooth road; pitch and roll as geometry/euler.h.
-struct BodyMotion {
+struct BodyDisplacement {
   double heave = 0.0;  ///< m, up, of the rear axle's centre
   double pitch = 0.0;  ///< rad, nose down
   double roll = 0.0;   ///< rad, right side down
@@ -25,7 +25,8 @@ class RoughRoad {
   RoughRoad(double roughness_m3, double wheelbase, double track_width, RandomStream random);
 
   /// place: of the rear axle's centre, enu; heading: rad, counterclockwise from east; velocity: m/s, enu.
-  [[nodiscard]] BodyMotion at(const Eigen::Vector2d& place, double heading, const Eigen::Vector2d& velocity) const;
+  [[nodiscard]] BodyDisplacement at(const Eigen::Vector2d& place, double heading,
+                                    const Eigen::Vector2d& velocity) const;
 
  private:
   struct Wave {
@@ -36,7 +37,7 @@ class RoughRoad {
   std::vector<Wave> waves_;
 };
 
-/// Motion of the body over that of the road below a wheel, at an angular frequency in rad/s, (S.4).
+/// Motion of the body over that of the road below a wheel, at an angular frequency in rad/s, (D.1.4).
 std::complex<double> body_response(double frequency);
 
 }  // namespace roadfix

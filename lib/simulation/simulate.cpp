@@ -13,7 +13,7 @@ namespace {
 constexpr double kKnot_s = 0.05;  // of the spline that is the truth
 constexpr int kLead = 40;         // knots before the start and after the end: smoothing and latency reach there
 
-/// Angles of a car on a slope that leans with its accelerations and slips sideways on its rear tyres, (S.2).
+/// Angles of a car on a slope that leans with its accelerations and slips sideways on its rear tyres, (D.1.2).
 PoseCoordinates coordinates(const Eigen::Vector3d& pose, double acceleration, double lateral, double direction,
                             const MotionConfig& c) {
   const Terrain ground = terrain_at(pose.head<2>(), c.hill_factor);
@@ -55,7 +55,7 @@ Motion drive_route(const SimulatedDrive& drive) {
     const double yaw_rate = (poses[b].z() - poses[a].z()) / (2.0 * kKnot_s);
     PoseCoordinates x = coordinates(poses[i], acceleration, speed * yaw_rate, direction, c);
     const Eigen::Vector2d velocity = (poses[b] - poses[a]).head<2>() / (2.0 * kKnot_s);
-    const BodyMotion ride = road.at(poses[i].head<2>(), x(3), velocity);
+    const BodyDisplacement ride = road.at(poses[i].head<2>(), x(3), velocity);
     x.tail<4>() += Eigen::Vector4d(ride.heave, 0.0, ride.pitch, ride.roll);
     samples.push_back(x);
   }

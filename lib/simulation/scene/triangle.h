@@ -1,5 +1,5 @@
 /// A ray against one triangle, twice: in floats, eight rays at a time, with a bound on the rounding, which finds quickly
-/// what may be hit; and in doubles, by sums, products and quotients alone, which decides (MODEL.md, section "Pictures").
+/// what may be hit; and in doubles, by sums, products and quotients alone, which decides (MODEL.md, section 5).
 /// So no picture depends on an instruction that makers of processors implement differently.
 #pragma once
 

@@ -49,15 +49,15 @@ TEST_CASE("pitch and roll of a standing car are those of the plane below its whe
   // A car turned by 90 degrees whose axle lies where the first one's left wheels are, and one that is as long as the
   // first is wide, see the same four points.
   const RoughRoad r(kClassB, 2.0, 2.0, RandomStream(4, 1));
-  const BodyMotion a = r.at({5.0, 7.0}, 0.3, {0.0, 0.0});
+  const BodyDisplacement a = r.at({5.0, 7.0}, 0.3, {0.0, 0.0});
   const Eigen::Vector2d forward(std::cos(0.3), std::sin(0.3));
   const Eigen::Vector2d left(-forward.y(), forward.x());
-  const BodyMotion b = r.at(Eigen::Vector2d(5.0, 7.0) + forward - left, 0.3 + kPi / 2.0, {0.0, 0.0});
+  const BodyDisplacement b = r.at(Eigen::Vector2d(5.0, 7.0) + forward - left, 0.3 + kPi / 2.0, {0.0, 0.0});
   CHECK(std::abs(a.pitch) > 1e-4);
   CHECK(std::abs(a.roll) > 1e-4);
   CHECK(b.pitch == Approx(-a.roll));  // its nose points to the first one's left
   CHECK(b.roll == Approx(a.pitch));
-  const BodyMotion far = r.at(Eigen::Vector2d(5.0, 7.0) + 2.0 * forward, 0.3, {0.0, 0.0});
+  const BodyDisplacement far = r.at(Eigen::Vector2d(5.0, 7.0) + 2.0 * forward, 0.3, {0.0, 0.0});
   CHECK(far.heave == Approx(a.heave - 2.0 * a.pitch));  // its rear axle is where the first one's front axle is
 }
 
@@ -84,8 +84,8 @@ Spread spread(double roughness, double speed) {
     const RoughRoad r = road(roughness, static_cast<std::uint64_t>(seed));
     for (int i = 0; i < kTimes; ++i) {
       const Eigen::Vector2d p(speed * 3.7 * i, 0.0);
-      const BodyMotion now = r.at(p, 0.0, {speed, 0.0});
-      const BodyMotion next = r.at(p + Eigen::Vector2d(speed * kStep_s, 0.0), 0.0, {speed, 0.0});
+      const BodyDisplacement now = r.at(p, 0.0, {speed, 0.0});
+      const BodyDisplacement next = r.at(p + Eigen::Vector2d(speed * kStep_s, 0.0), 0.0, {speed, 0.0});
       sum.heave_m += now.heave * now.heave;
       sum.up_mps += std::pow((next.heave - now.heave) / kStep_s, 2);
       sum.pitch_radps += std::pow((next.pitch - now.pitch) / kStep_s, 2);
@@ -112,7 +112,7 @@ TEST_CASE("the body heaves by about a centimetre and a few centimetres per secon
 }
 
 TEST_CASE("an even road leaves the body alone") {
-  const BodyMotion ride = road(0.0, 1).at({3.0, 4.0}, 0.2, {10.0, 0.0});
+  const BodyDisplacement ride = road(0.0, 1).at({3.0, 4.0}, 0.2, {10.0, 0.0});
   CHECK(ride.heave == 0.0);
   CHECK(ride.pitch == 0.0);
   CHECK(ride.roll == 0.0);
@@ -140,8 +140,8 @@ TEST_CASE("a simulated car heaves while it drives, and not at all where it stops
 
 TEST_CASE("the same place passed at the same speed has the same bump, another seed has others") {
   const RoughRoad r = road(kClassB, 3);
-  const BodyMotion a = r.at({100.0, 20.0}, 0.1, {12.0, 1.2});
-  const BodyMotion b = r.at({100.0, 20.0}, 0.1, {12.0, 1.2});
+  const BodyDisplacement a = r.at({100.0, 20.0}, 0.1, {12.0, 1.2});
+  const BodyDisplacement b = r.at({100.0, 20.0}, 0.1, {12.0, 1.2});
   CHECK(a.heave == b.heave);
   CHECK(a.heave != road(kClassB, 4).at({100.0, 20.0}, 0.1, {12.0, 1.2}).heave);
 }
