@@ -34,8 +34,8 @@ void Filter::adopt(const Filter& other, const CameraFacts& camera) {
   mean.T_left_right = camera.T_left_right;
   mean.camera_offset = camera.offset;
   BaseVector std = BaseVector::Zero();
-  std.segment<3>(kCameraTurn).setConstant(camera.turn_std);
-  std.segment<3>(kCameraPlace).setConstant(camera.place_std);
+  std.segment<3>(kCameraTurn).setConstant(std::max(camera.turn_std, config_.camera.turn_floor));
+  std.segment<3>(kCameraPlace).setConstant(std::max(camera.place_std, config_.camera.place_floor));
   if (camera.right) {
     std.segment<3>(kRightTurn).setConstant(camera.right_turn_std);
   } else {

@@ -76,6 +76,7 @@ void Navigation::add(const GnssFix& fix, int64_t id) {
   const bool again = fix.t_us == last_fix_us_ && fix.antenna.latitude == last_fix_.latitude &&
                      fix.antenna.longitude == last_fix_.longitude && fix.antenna.height == last_fix_.height;
   const AidingStatus screened = again ? AidingStatus::kBadInput : screen_.check(fix);
+  if (local()) return note(record_of(AidingSource::kGnssPosition, AidingStatus::kDisabled, fix.t_us, id));
   if (screened != AidingStatus::kAccepted) return note(record_of(AidingSource::kGnssPosition, screened, fix.t_us, id));
   if (!anchor_) anchor_ = fix.antenna;
   last_fix_us_ = fix.t_us;
@@ -90,13 +91,14 @@ void Navigation::add(const WheelSample& wheels, int64_t id) {
   if (!config_.sources.wheel_speed) return;
   const std::optional<Queued> q = queued(wheels, id, config_);
   if (!q) return note(record_of(AidingSource::kWheelSpeed, AidingStatus::kBadInput, wheels.t_us, id));
+  local_start_.add(*q);
   if (seconds_between(last_wheel_us_, wheels.t_us) < config_.aiding.wheel_interval - kWheelPeriodSlack) return;
   last_wheel_us_ = wheels.t_us;
   queue_.push(*q);
 }
 
 void Navigation::add(const MagSample& mag, int64_t id) {
-  if (!config_.sources.magnetic_heading) return;
+  if (!config_.sources.magnetic_heading || local()) return;
   if (seconds_between(last_magnetic_us_, mag.t_us) < config_.aiding.magnetic_interval) return;
   const std::optional<Queued> q = queued(mag, id, config_);
   if (!q) return;
@@ -157,6 +159,8 @@ void Navigation::step(const ImuSample& imu) {
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == Phase::kHeading) {
     step_heading(imu, dt, block_done);
+  } else if (local()) {
+    if (block_done && !imu_noise_.frozen()) try_local_start(imu.t_us);
   } else {
     phase_ = alignment_.has_fix() ? Phase::kLevelling : Phase::kWaiting;
     if (!block_done || imu_noise_.frozen()) return;
@@ -191,6 +195,16 @@ void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) 
   }
   if (abandoned_ && usable()) count_reset(*abandoned_, all.leader().state().x);
   if (block_done && all.confirmed()) end_alignment();
+}
+
+void Navigation::try_local_start(int64_t t_us) {
+  const std::optional<StartState> start =
+      local_start_.attempt(config_, t_us, standstill_, camera_ ? &*camera_ : nullptr);
+  if (!start) return;
+  forget_before(t_us + 1);
+  alignment_.hypotheses().start(inertial::Earth(), *start);
+  predictor_.emplace(inertial::Earth());
+  end_alignment();
 }
 
 void Navigation::end_alignment() {
@@ -354,6 +368,7 @@ void Navigation::serialise(Archive& a) {
   imu_noise_.serialise(a);
   standstill_.serialise(a);
   ring_.serialise(a);
+  local_start_.serialise(a);
   queue_.serialise(a);
   serialise_optional(
       a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });

@@ -19,6 +19,7 @@
 #include "navigation/aiding/camera/camera_control.h"
 #include "navigation/aiding/gnss_screen.h"
 #include "navigation/initialisation/alignment.h"
+#include "navigation/initialisation/local_start.h"
 #include "navigation/output_predictor.h"
 
 namespace roadfix::navigation {
@@ -41,6 +42,7 @@ struct NavigationStatus {
 
 struct NavigationOutput {
   Phase phase = Phase::kWaiting;
+  bool local = false;  ///< the level frame is where it started; else enu
   Odometry odometry;   ///< imu origin and axes in the level frame
   std::string reason;  ///< plain words, empty when all is well
   int reset_counter = 0;
@@ -87,11 +89,17 @@ class Navigation {
   void use_pictures(int64_t t_us);
   void mend_steps();
   void align_again();
+  void try_local_start(int64_t t_us);
   void end_alignment();
   void note(AidingRecord record, int64_t id = 0);
   void forget_before(int64_t t_us);
   [[nodiscard]] inertial::ImuNoise noise_over(double dt) const;
   [[nodiscard]] bool usable() const;
+  /// No GNSS is to be used: the frame is local.
+  [[nodiscard]] bool local() const {
+    const SourceList& s = config_.sources;
+    return !s.gnss_position && !s.gnss_velocity && !s.gnss_heading;
+  }
   [[nodiscard]] std::optional<int64_t> coasting_since() const;
   [[nodiscard]] bool moved_meanwhile(double dt) const;
   void count_reset(const SE3& before, const Mean& after);
@@ -107,6 +115,7 @@ class Navigation {
   inertial::ImuRing ring_;
   MeasurementQueue queue_;
   Alignment alignment_;
+  LocalStart local_start_;
   std::optional<Geodetic> anchor_;
   std::optional<Filter> filter_;
   std::optional<CameraControl> camera_;  ///< where there is one that is to be used

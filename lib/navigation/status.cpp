@@ -11,6 +11,9 @@ namespace {
 constexpr char kHeadingRoughly[] = "the heading is known roughly";
 constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is taken for an error of the receiver";
 
+constexpr char kWaitsForRest[] = "rest, or a speed from the wheels";
+constexpr double kInvalidVelocity = 2.0;  // m/s, sigma: without GNSS, more is no motion estimate
+
 const char* waiting_for(Phase phase, bool has_imu, bool has_fix) {
   switch (phase) {
     case Phase::kDone:
@@ -31,10 +34,11 @@ const char* waiting_for(Phase phase, bool has_imu, bool has_fix) {
 NavigationOutput Navigation::output() {
   NavigationOutput out;
   out.phase = phase_;
+  out.local = local();
   out.reset_counter = reset_counter_;
   out.reset_delta = reset_delta_;
   out.odometry.t_us = ring_.empty() ? last_step_us_ : ring_.back().t_us;
-  const char* waits = waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
+  const char* waits = local() ? kWaitsForRest : waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
   if (filter() == nullptr) {
     out.reason = std::string("waits for ") + waits;
     return out;
@@ -44,13 +48,15 @@ NavigationOutput Navigation::output() {
   const double horizontal = std::sqrt(out.odometry.cov_pose(0, 0) + out.odometry.cov_pose(1, 1));
   if (!usable()) {
     out.reason = std::string("waits for ") + waits;
-  } else if (!(horizontal < config_.start.invalid_sigma_m)) {
+  } else if (local() && out.odometry.cov_velocity.diagonal().maxCoeff() > kInvalidVelocity * kInvalidVelocity) {
+    out.reason = "velocity not known well enough";
+  } else if (!(horizontal < config_.start.invalid_sigma_m) && !local()) {
     out.reason = "position too uncertain";
   } else {
     const bool coasting = coasting_since().has_value();
     if (phase_ == Phase::kHeading) out.reason = kHeadingRoughly;
     out.odometry.validity = coasting || alignment_.parked() ? Validity::kCoasting : Validity::kValid;
-    if (coasting) out.reason = "coasting without GNSS";
+    if (coasting) out.reason = local() ? "coasting without wheels and tracks" : "coasting without GNSS";
     if (alignment_.parked()) out.reason = "from the place where it was parked, without GNSS yet";
     if (aiding_.gnss_position().height_differs()) out.reason = kHeightContradicts;
     if (imu_noise_.frozen()) out.reason = "IMU readings do not change";
@@ -60,7 +66,9 @@ NavigationOutput Navigation::output() {
 
 std::optional<int64_t> Navigation::coasting_since() const {
   const auto used_at = [&](AidingSource source) { return used_at_us_[static_cast<size_t>(source)]; };
-  const int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
+  int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
+  if (local())
+    anchored = std::max({anchored, used_at(AidingSource::kWheelSpeed), used_at(AidingSource::kCameraTracks)});
   const bool coasting = usable() && seconds_between(anchored, last_step_us_) > config_.start.coasting_s;
   return coasting ? std::optional(anchored) : std::nullopt;
 }
@@ -69,6 +77,7 @@ NavigationStatus Navigation::status() const {
   NavigationStatus s;
   s.phase = phase_;
   s.waits_for = waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
+  if (local() && phase_ != Phase::kDone) s.waits_for = kWaitsForRest;
   s.gnss_quality = screen_.quality();
   s.gnss_reason = screen_.reason();
   if (s.gnss_reason.empty() && aiding_.gnss_position().height_differs()) s.gnss_reason = kHeightContradicts;

@@ -60,7 +60,7 @@ int8_t pose_state(const navigation::NavigationOutput& output) {
 
 void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose) {
   fill_pose(output.odometry, pose);
-  pose.frame = pose_t::FRAME_ENU;
+  pose.frame = output.local ? pose_t::FRAME_LOCAL : pose_t::FRAME_ENU;
   if (anchor) {
     pose.anchor_lat_deg = anchor->latitude / kDegree;
     pose.anchor_lon_deg = anchor->longitude / kDegree;

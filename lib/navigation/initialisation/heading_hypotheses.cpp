@@ -26,19 +26,14 @@ constexpr double kParkedYaw = 0.3 * kDegree;
 constexpr double kNegligible = 1e-9;  // share of a hypothesis that is dropped
 constexpr double kSameHeading = 15.0 * kDegree;
 constexpr double kStartPosition = 1000.0, kStartVelocity = 100.0, kStartTilt = 0.5;  // m, m/s, rad: nothing is known
-
-// Roll and pitch that turn the mean specific force upright, with the yaw asked for.
-Eigen::Quaterniond attitude(const Eigen::Vector3d& mean_accel, double yaw) {
-  const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(mean_accel, Eigen::Vector3d::UnitZ());
-  return (exp_q(Eigen::Vector3d(0.0, 0.0, yaw - yaw_of(level))) * level).normalized();
-}
+constexpr double kLocalPlace = 1e-4;  // m: where a local frame begins is a convention
 
 BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double yaw_std) {
   const VehicleFacts& v = c.facts;
   BaseVector std = BaseVector::Zero();
   std.segment<3>(kAtt) << kStartTilt, kStartTilt, yaw_std;
   std.segment<3>(kVel).setConstant(kStartVelocity);
-  std.segment<3>(kPos).setConstant(kStartPosition);
+  std.segment<3>(kPos).setConstant(s.local ? kLocalPlace : kStartPosition);
   std.segment<3>(kGyroBias).setConstant(v.gyro_bias_std);
   std.segment<3>(kAccelBias).setConstant(v.accel_bias_std);
   std.segment<6>(kGyroScale).setConstant(v.scale_std);
@@ -90,12 +85,12 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
                                        double log_weight) {
   Mean x;
   x.t_us = s.t_us;
-  x.nav.q_level_imu = attitude(s.mean_accel, yaw);
+  x.nav.q_level_imu = level_attitude(s.mean_accel, yaw);
   x.nav.velocity = s.velocity;
   x.mounting = config_.facts.mounting;
   x.p_imu_axle = config_.facts.p_imu_axle;
   x.p_imu_antenna = config_.facts.p_imu_antenna;
-  x.nav.position = s.antenna - x.nav.q_level_imu * x.p_imu_antenna;
+  if (!s.local) x.nav.position = s.antenna - x.nav.q_level_imu * x.p_imu_antenna;
   BaseVector sigmas = start_sigmas(config_, s, yaw_std);
   if (s.memory) recall(*s.memory, x, sigmas);
   filters_.emplace_back(config_, earth, false);
@@ -113,11 +108,13 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   Measurement<3> velocity;
   velocity.residual = s.velocity - filter.state().x.nav.velocity;
   velocity.H.block<3, 3>(0, kVel).setIdentity();
-  velocity.H.block<3, 3>(0, kAtt) = -skew(filter.state().x.nav.velocity);
+  // Wheels tell it in vehicle axes: free of phi, as it turns with the attitude.
+  if (!s.local) velocity.H.block<3, 3>(0, kAtt) = -skew(filter.state().x.nav.velocity);
   velocity.R = s.velocity_std * s.velocity_std * Eigen::Matrix3d::Identity();
   (void)filter.fuse(AidingSource::kGnssVelocity, s.t_us, velocity, open);
-  (void)filter.fuse(AidingSource::kGnssPosition, s.t_us,
-                    gnss_position(filter.state(), BodyMotion(), s.antenna, s.antenna_cov, 0.0), open);
+  if (!s.local)
+    (void)filter.fuse(AidingSource::kGnssPosition, s.t_us,
+                      gnss_position(filter.state(), BodyMotion(), s.antenna, s.antenna_cov, 0.0), open);
   if (s.standing)
     (void)filter.fuse(AidingSource::kZeroRate, s.t_us,
                       zero_rate(filter.state(), s.mean_gyro, filter.earth().rate(), config_.aiding.zero_rate_std),

@@ -69,6 +69,11 @@ StartState standing_start(const StartContext& c) {
 
 }  // namespace
 
+Eigen::Quaterniond level_attitude(const Eigen::Vector3d& mean_accel, double yaw) {
+  const Eigen::Quaterniond level = Eigen::Quaterniond::FromTwoVectors(mean_accel, Eigen::Vector3d::UnitZ());
+  return (exp_q(Eigen::Vector3d(0.0, 0.0, yaw - yaw_of(level))) * level).normalized();
+}
+
 std::optional<StartState> StartWithFixes::attempt(const StartContext& c) const {
   if (!c.fix || c.enu == nullptr) return std::nullopt;
   const GnssFix& fix = *c.fix;

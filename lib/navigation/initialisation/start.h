@@ -14,6 +14,7 @@ namespace roadfix::navigation {
 struct StartState {
   int64_t t_us = 0;
   bool standing = false;
+  bool local = false;  ///< no GNSS: the frame begins here, `antenna` says nothing
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_accel = Eigen::Vector3d::Zero();
   double accel_std = 1.0;                             ///< m/s2, how far the mean may be from gravity
@@ -27,6 +28,9 @@ struct StartState {
   std::optional<Memory> memory;      ///< of the last drive
   std::optional<double> parked_yaw;  ///< rad, imu, where the car seems to stand as it was parked
 };
+
+/// Roll and pitch that turn the mean specific force upright, with the yaw asked for (rad).
+Eigen::Quaterniond level_attitude(const Eigen::Vector3d& mean_accel, double yaw);
 
 /// What the strategies see.
 struct StartContext {

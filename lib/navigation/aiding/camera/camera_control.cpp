@@ -12,6 +12,12 @@ namespace {
 constexpr int kEnoughTracks = 3;       // of an update, to judge the camera by
 constexpr double kShortestStep = 0.2;  // s, at most, that one picture counts for in the trial
 
+// s, between the two pictures of a flow, at least and where there are enough, and of the newer one.
+constexpr double kLeastFlowSpan = 0.25, kFlowSpan = 0.45, kFlowAge = 0.3;
+constexpr size_t kFlowTracks = 10;       // common, at least
+constexpr double kStillMotion_px = 1.0;  // that a standing car's camera may make: an idling engine
+constexpr double kRayleighMedian = 1.177, kRayleighMedianStd = 0.849;  // of unit sigma; the second over sqrt(n)
+
 int64_t micros(double s) { return static_cast<int64_t>(std::llround(1e6 * s)); }
 
 }  // namespace
@@ -47,6 +53,33 @@ void CameraControl::skip_before(int64_t t_us, const Mean& x) {
 void CameraControl::forget_poses(State& state) {
   tracks_.clear();
   state.drop_clones();
+}
+
+std::optional<CameraControl::Flow> CameraControl::flow(int64_t t_us, const Mean& x) const {
+  const int64_t until_us = t_us - micros(x.camera_offset);
+  const auto after =
+      std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.t_us > until_us; });
+  if (after == waiting_.begin() || seconds_between((after - 1)->t_us, until_us) > kFlowAge) return std::nullopt;
+  const auto now = after - 1;
+  auto before = now;
+  while (before != waiting_.begin() && seconds_between(before->t_us, now->t_us) < kFlowSpan) --before;
+  if (seconds_between(before->t_us, now->t_us) < kLeastFlowSpan) return std::nullopt;
+  std::vector<double> moved;
+  double variance = 0.0;
+  auto old = before->picture.tracks.begin();
+  const auto pictures = static_cast<double>(now - before);
+  for (const TrackSighting& s : now->picture.tracks) {
+    while (old != before->picture.tracks.end() && old->track < s.track) ++old;
+    if (old == before->picture.tracks.end() || old->track != s.track) continue;
+    moved.push_back((s.left - old->left).norm());
+    variance += 2.0 * s.sigma_px * s.sigma_px + pictures * s.walk_px * s.walk_px;
+  }
+  if (moved.size() < kFlowTracks) return std::nullopt;
+  const auto count = static_cast<double>(moved.size());
+  const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);
+  std::nth_element(moved.begin(), middle, moved.end());
+  const double noise = std::sqrt(variance / count) * (kRayleighMedian + 3.0 * kRayleighMedianStd / std::sqrt(count));
+  return Flow{*middle, std::hypot(kStillMotion_px, noise)};
 }
 
 bool CameraControl::makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const {

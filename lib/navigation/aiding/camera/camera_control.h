@@ -38,6 +38,13 @@ class CameraControl {
   /// The filter jumped: tracks are forgotten, and its poses.
   void forget_poses(State& state);
 
+  /// Median motion of the tracks over a quarter to half a second up to t_us (the imu's clock), before pictures are used, and what it
+  /// is at most while the camera stands, px; nothing without pictures or tracks.
+  struct Flow {
+    double median_px = 0.0, still_px = 0.0;
+  };
+  [[nodiscard]] std::optional<Flow> flow(int64_t t_us, const Mean& x) const;
+
   [[nodiscard]] CameraFitness fitness() const { return fitness_; }
   /// Tracks in the newest picture that was used.
   [[nodiscard]] int num_seen() const { return num_seen_; }

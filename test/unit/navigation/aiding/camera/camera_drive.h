@@ -16,6 +16,7 @@ struct CameraRun {
   bool camera = true, two_eyes = false;
   double sigma_px = 0.1, walk_px = 0.15, right_sigma_px = 0.2;  ///< what the filter is told of the tracks
   double velocity_std = 0.05, tilt_std = 2e-3, yaw_std = 1e-2;
+  double camera_turn_std = 0.0;  ///< rad
   navigation::CameraTuning tuning;
   std::function<void(TrackPicture&)> spoil = {};     ///< what happens to a picture before it comes
   std::function<void(navigation::Mean&)> tell = {};  ///< what the calibration says wrong
@@ -82,6 +83,7 @@ inline navigation::BaseVector start_std(const CameraRun& run, const navigation::
   std.segment<3>(kAccelBias).setConstant(facts.accel_bias_std);
   std.segment<3>(kGyroScale).setConstant(facts.scale_std);
   std.segment<3>(kAccelScale).setConstant(facts.scale_std);
+  std.segment<3>(kCameraTurn).setConstant(run.camera_turn_std);
   if (!run.two_eyes) std.segment<3>(kLens) = Eigen::Vector3d(0.01, 0.02, 0.05);
   return std;
 }

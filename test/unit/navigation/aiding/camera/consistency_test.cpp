@@ -139,4 +139,13 @@ TEST_CASE("a camera that is wrong is found unfit, and costs nothing") {
     std::erase_if(p.tracks, [](const TrackSighting& s) { return s.left.x() > 620.0; });
   };
   check("half covered", covered);
+  CameraRun turned = run;
+  turned.tell = [](Mean& x) { x.T_imu_camera.q = x.T_imu_camera.q * exp_q({0.0, 2.0 * kDegree, 0.0}); };
+  turned.camera_turn_std = CameraTuning().turn_floor;
+  check("turned by two degrees", turned);
+  // Called exact, the same mounting is either found out or does harm.
+  turned.camera_turn_std = 0.0;
+  const Faulty exact = with(turned);
+  std::printf("turned, called exact: %.3f m/s %.3f m, unfit %d\n", exact.velocity_rms, exact.position_rms, exact.unfit);
+  CHECK((exact.unfit > 0 || exact.velocity_rms > 1.05 * without.velocity_rms));
 }

@@ -1,0 +1,88 @@
+#include "navigation/initialisation/local_start.h"
+
+#include <cmath>
+
+#include "vehicle/axle_velocity.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+constexpr double kWheelAge = 0.3;         // s, of a wheel speed to start with
+constexpr double kForward = 4.0;          // m/s: faster, hardly a car is in reverse
+constexpr double kRestSpeed = 0.02;       // m/s, of wheels that stand
+constexpr double kRestVelocity = 0.02;    // m/s, sigma of a start where wheels say that it stands
+constexpr double kUnseenVelocity = 0.05;  // m/s, where a still picture alone does
+constexpr int kCalmBlocks = 4;            // in a row, where neither says anything
+constexpr double kStandingAccel = 0.03;   // m/s2, by which the mean specific force may miss gravity while standing
+constexpr double kMovingAccel = 1.5;      // m/s2, along the way, likewise in motion: everyday driving
+constexpr double kLeastSpeed = 1.0;       // m/s: slower, a start waits for rest
+constexpr double kAside = 0.1;            // m/s, sigma of the velocity across the vehicle,
+constexpr double kAsideShare = 0.05;      // and what sideslip adds, as a share of the speed
+constexpr double kLocalYaw = 1e-4;        // rad: the heading at the start is a convention
+
+StartState local_start(const LocalContext& c) {
+  const inertial::ImuBlock& block = c.standstill.block();
+  StartState s;
+  s.t_us = c.t_us;
+  s.local = true;
+  s.mean_gyro = block.gyro;
+  s.mean_accel = block.accel;
+  s.yaw = 0.0;
+  s.yaw_std = kLocalYaw;
+  return s;
+}
+
+}  // namespace
+
+bool LocalContext::sees_rest() const {
+  if (wheel_speed) return std::abs(*wheel_speed) < kRestSpeed;
+  return flow_px && *flow_px < still_flow_px;
+}
+
+bool LocalContext::sees_motion() const { return (wheel_speed || flow_px) && !sees_rest(); }
+
+std::optional<StartState> start_at_rest(const LocalContext& c) {
+  if (!c.standstill.calm() || c.sees_motion()) return std::nullopt;
+  if (!c.sees_rest() && c.standstill.calm_blocks() < kCalmBlocks) return std::nullopt;
+  StartState s = local_start(c);
+  s.standing = true;
+  s.accel_std = kStandingAccel;
+  s.velocity_std = c.wheel_speed ? kRestVelocity : kUnseenVelocity;
+  return s;
+}
+
+std::optional<StartState> start_with_speed(const LocalContext& c) {
+  if (!c.wheel_speed || std::abs(*c.wheel_speed) < kLeastSpeed) return std::nullopt;
+  const VehicleFacts& facts = c.config.facts;
+  StartState s = local_start(c);
+  // The axle moves along the vehicle; the imu besides by the turn about it.
+  const Eigen::Vector3d ahead = vehicle::R_imu_vehicle(facts.mounting) * Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d v_imu = *c.wheel_speed * ahead - s.mean_gyro.cross(facts.p_imu_axle);
+  s.mean_accel -= s.mean_gyro.cross(v_imu);
+  s.accel_std = kMovingAccel;
+  s.velocity = level_attitude(s.mean_accel, 0.0) * v_imu;
+  s.velocity_std = kAside + (kAsideShare + facts.mounting_std.tail<2>().maxCoeff()) * std::abs(*c.wheel_speed);
+  return s;
+}
+
+std::optional<StartState> LocalStart::attempt(const NavigationConfig& config, int64_t t_us,
+                                              const inertial::StandstillDetector& standstill,
+                                              const CameraControl* camera) const {
+  LocalContext context{config, t_us, standstill, std::nullopt, std::nullopt};
+  if (camera != nullptr) {
+    Mean x;
+    x.camera_offset = config.facts.camera->offset;
+    if (const auto flow = camera->flow(t_us, x)) {
+      context.flow_px = flow->median_px;
+      context.still_flow_px = flow->still_px;
+    }
+  }
+  const bool fresh = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < kWheelAge;
+  const double speed = std::abs(speed_);
+  if (fresh && (has_sign_ || speed < kRestSpeed || speed > kForward)) context.wheel_speed = speed_;
+  if (const auto rest = start_at_rest(context)) return rest;
+  return start_with_speed(context);
+}
+
+}  // namespace roadfix::navigation

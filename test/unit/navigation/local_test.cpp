@@ -1,0 +1,168 @@
+// The navigation filter without GNSS: its frame begins where it starts, at rest or with a speed from the wheels.
+#include <catch2/catch.hpp>
+#include <cstdio>
+
+#include "geometry/euler.h"
+#include "geometry/so3.h"
+#include "navigation/navigation.h"
+#include "simulation/scenarios.h"
+#include "support/track_drive.h"
+
+using namespace roadfix;
+using namespace roadfix::navigation;
+using namespace roadfix::test;
+
+namespace {
+
+struct Run {
+  std::string scenario = "city_loop";
+  double from_s = 0.0, until_s = 60.0;
+  int eyes = 1;
+  bool wheels = true, pictures = true;
+};
+
+NavigationConfig config_of(const TrackDrive& d, const Run& run) {
+  const ScenarioConfig& s = d.drive.config;
+  NavigationConfig c;
+  c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = false;
+  c.sources.wheel_speed = run.wheels;
+  VehicleFacts& v = c.facts;
+  v.imu = {s.imu.gyro_noise_radps_per_rthz, s.imu.accel_noise_mps2_per_rthz};
+  v.gyro_bias_std = s.imu.gyro_bias_std_radps;
+  v.accel_bias_std = s.imu.accel_bias_std_mps2;
+  v.scale_std = s.imu.gyro_scale_std;
+  v.correlation_s = 1e6;
+  v.wheels.speed_noise = s.wheels.speed_noise_mps;
+  v.wheel_scale_std = 0.01;
+  v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
+  v.p_imu_axle_std.setConstant(0.05);
+  if (run.eyes == 0) return c;
+  CameraFacts& camera = v.camera.emplace();
+  camera.left = d.rig.camera.intrinsics();
+  if (run.eyes == 2) camera.right = camera.left;
+  camera.T_imu_camera = SE3{Eigen::Quaterniond::Identity(), s.imu.position_m}.inverse() * d.T_vehicle_left;
+  camera.T_left_right = d.T_left_right;
+  return c;
+}
+
+struct Outcome {
+  double first_s = -1.0;              ///< after from_s
+  double way_m = 0.0, error_m = 0.0;  ///< since the first valid pose; of the displacement since then, from its heading
+  int valid = 0, invalid_after = 0;
+  bool local = false;
+  std::string waits_for;
+};
+
+Outcome run(const TrackDrive& d, const Run& r) {
+  Navigation filter(config_of(d, r));
+  const int64_t start = d.drive.imu.front().t_us + std::llround(1e6 * r.from_s);
+  const int64_t end = d.drive.imu.front().t_us + std::llround(1e6 * r.until_s);
+  Outcome out;
+  std::optional<SE3> first, first_true;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  for (const DriveEvent& e : d.events) {
+    const int64_t t_us = stamp_of(e);
+    if (t_us < start || t_us > end) continue;
+    if (const auto* fix = std::get_if<GnssFix>(&e)) filter.add(*fix);
+    if (const auto* wheels = std::get_if<WheelSample>(&e)) filter.add(*wheels);
+    if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && r.pictures) {
+      TrackPicture p{frame->t_us, {}};
+      for (const TrackObservation& o : frame->tracks)
+        p.tracks.push_back({o.id, o.left, r.eyes == 2 ? o.right : std::nullopt, 0.1, 0.15, 0.2});
+      filter.add(p);
+    }
+    const auto* imu = std::get_if<ImuSample>(&e);
+    if (imu == nullptr) continue;
+    (void)filter.advance(*imu);
+    filter.clear_records();
+    if ((t_us - start) / 10'000 % 10 != 0) continue;
+    const NavigationOutput o = filter.output();
+    out.local = o.local;
+    if (o.odometry.validity == Validity::kInvalid) {
+      out.invalid_after += first ? 1 : 0;
+      continue;
+    }
+    ++out.valid;
+    const Odometry truth = d.drive.truth_at(t_us);
+    const SE3 T = truth.T_frame_vehicle * SE3{d.drive.errors.q_vehicle_imu, d.drive.config.imu.position_m};
+    if (!first) {
+      first = o.odometry.T_frame_vehicle;
+      first_true = T;
+      before = T.p;
+      out.first_s = seconds_between(start, t_us);
+    }
+    out.way_m += (T.p - before).norm();
+    before = T.p;
+    const double turn = yaw_of(first_true->q) - yaw_of(first->q);
+    out.error_m = (exp_q({0.0, 0.0, turn}) * (o.odometry.T_frame_vehicle.p - first->p) - (T.p - first_true->p)).norm();
+  }
+  out.waits_for = filter.status().waits_for;
+  return out;
+}
+
+const TrackDrive& city() {
+  static const TrackDrive kDrive = [] {
+    ScenarioConfig s = scenario("city_loop");
+    s.duration_s = 60.0;
+    s.faults.clear();
+    return make_track_drive(s, 1, with_noise_of_pictures({}));
+  }();
+  return kDrive;
+}
+
+double share(const char* name, const Outcome& o) {
+  std::printf("%s: first %.2f s, %.2f m of %.0f m\n", name, o.first_s, o.error_m, o.way_m);
+  return o.error_m / std::max(1.0, o.way_m);
+}
+
+}  // namespace
+
+TEST_CASE("without GNSS it starts at rest, in a local frame, and the camera holds the way") {
+  const Outcome one = run(city(), {.wheels = false});
+  CHECK(one.local);
+  CHECK(one.first_s < 2.5);
+  CHECK(one.invalid_after == 0);
+  CHECK(one.way_m > 200.0);
+  const double seeing = share("one eye", one);
+  CHECK(seeing < 0.02);
+  CHECK(share("two eyes", run(city(), {.eyes = 2, .wheels = false})) < 0.02);
+  CHECK(share("with wheels", run(city(), {})) < 0.01);
+  // The camera does it: without, the same start drifts off.
+  CHECK(share("blind", run(city(), {.eyes = 0, .wheels = false})) > 2.0 * seeing);
+}
+
+TEST_CASE("without GNSS a start in motion needs a speed") {
+  const Outcome wheels = run(city(), {.from_s = 25.0});
+  CHECK(wheels.first_s < 2.0);
+  CHECK(share("wheels, in motion", wheels) < 0.03);
+  // Tracks move: what is calm is not taken for rest.
+  const Outcome none = run(city(), {.from_s = 20.0, .until_s = 26.0, .wheels = false});
+  CHECK(none.valid == 0);
+  CHECK(none.waits_for == "rest, or a speed from the wheels");
+}
+
+TEST_CASE("a calm road is taken for rest only where nothing contradicts") {
+  inertial::StandstillDetector calm;
+  int64_t t_us = 1'000'000;
+  for (int i = 0; i < 400; ++i) {
+    t_us += 10'000;
+    (void)calm.add({t_us, Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 9.81)}, 0.01, {1e-4, 1e-3}, false);
+  }
+  REQUIRE(calm.calm());
+  const NavigationConfig config;
+  LocalContext c{config, t_us, calm, std::nullopt, std::nullopt};
+  CHECK(start_at_rest(c));
+  c.flow_px = 4.0;
+  c.still_flow_px = 1.5;
+  CHECK_FALSE(start_at_rest(c));
+  c.flow_px = 1.0;
+  CHECK(start_at_rest(c));
+  c.wheel_speed = 20.0;
+  CHECK_FALSE(start_at_rest(c));
+  const auto moving = start_with_speed(c);
+  REQUIRE(moving);
+  CHECK(moving->velocity.norm() == Approx(20.0));
+  c.wheel_speed = 0.0;
+  CHECK(start_at_rest(c)->velocity_std < 0.05);
+  CHECK_FALSE(start_with_speed(c));
+}
