@@ -65,8 +65,7 @@ class CommaImporter {
   void say(const std::string& text) { drive_.remarks.push_back(text); }
   void say_left_out(const char* name, const CommaLog& log) {
     if (log.left_out == 0) return;
-    say(fmt::format("{}: {} of {} rows left out: NaN, or a time that is not after the row before", name, log.left_out,
-                    log.value.rows));
+    say(fmt::format("{}: {} of {} rows left out: NaN, or the time of another row", name, log.left_out, log.value.rows));
   }
 
   /// UTC of the device's start by the frames' GPS times (week, second of the week): the median, as few are off.
@@ -139,6 +138,7 @@ class CommaImporter {
     }
     if (!log) return;
     say_left_out(name, *log);
+    const std::vector<int64_t> epochs_us = epochs(*log);
     std::size_t without = 0;
     for (std::size_t i = 0; i < log->t_us.size(); ++i) {
       const std::size_t row = log->rows[i];
@@ -149,15 +149,31 @@ class CommaImporter {
         ++without;
         continue;
       }
-      drive_.gnss.push_back(fix(log->t_us[i], value(0), value(1), value(4), value(2), value(5)));
+      const int64_t t_us = epochs_us.empty() ? log->t_us[i] : epochs_us[i];
+      drive_.gnss.push_back(fix(t_us, value(0), value(1), value(4), value(2), value(5)));
     }
     sensors().gnss = GnssCalibration{};
     sensors().gnss->rate = rate_of(drive_.gnss);
     if (without > 0) say(fmt::format("{}: {} rows without a place left out", name, without));
-    say(
-        fmt::format("gnss is {}, at the time of its arrival; it tells no accuracy: places get 5 m, 10 m up, velocities "
-                    "0.3 m/s, unknown up",
-                    name));
+    say(fmt::format("gnss is {}, {}; it tells no accuracy: places get 5 m, 10 m up, velocities 0.3 m/s, unknown up",
+                    name, epochs_us.empty() ? "at the time of its arrival" : "at the receiver's own times"));
+  }
+
+  /// The receiver's UTC, which the dataset has in milliseconds though its description says seconds; empty where it is
+  /// none: not ascending, or far from when its message arrived.
+  static std::vector<int64_t> epochs(const CommaLog& log) {
+    constexpr double kMilliseconds = 1e11;     // as seconds, the year 5138
+    constexpr int64_t kLatest_us = 2'000'000;  // between a fix and its message
+    std::vector<int64_t> epochs_us;
+    for (std::size_t i = 0; i < log.rows.size(); ++i) {
+      const double utc = log.value.at(log.rows[i], 3);
+      if (!(utc > 0.0 && utc < 1e14)) return {};
+      const int64_t t_us = std::llround(utc * (utc > kMilliseconds ? 1e3 : 1e6));
+      const bool ascends = epochs_us.empty() || t_us > epochs_us.back();
+      if (!ascends || std::abs(t_us - log.t_us[i]) > kLatest_us) return {};
+      epochs_us.push_back(t_us);
+    }
+    return epochs_us;
   }
 
   static GnssFix fix(int64_t t_us, double lat_deg, double lon_deg, double height, double speed, double bearing_deg) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "config/config_error.h"
@@ -27,12 +28,17 @@ std::optional<CommaLog> read_comma_log(const std::filesystem::path& folder, std:
     throw ConfigError(log.value.file, 0, fmt::format("has {} rows, {} has {}", log.value.rows, t.file, t.rows));
   }
   constexpr double kLongest = 1e8;  // s, three years since the start
+  std::vector<std::size_t> order;
   for (std::size_t row = 0; row < t.rows; ++row) {
     if (!(t.at(row) >= 0.0 && t.at(row) <= kLongest)) {
       throw ConfigError(t.file, 0,
                         fmt::format("row {}: {} s: must be seconds since the start, within 0 to {}", row,
                                     to_text(t.at(row)), kLongest));
     }
+    order.push_back(row);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return t.at(a) < t.at(b); });
+  for (const std::size_t row : order) {
     bool counts = true;
     for (std::size_t c = 0; c < columns; ++c) counts = counts && std::isfinite(log.value.at(row, c));
     const int64_t t_us = clock.utime(t.at(row));

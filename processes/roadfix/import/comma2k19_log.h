@@ -20,7 +20,7 @@ struct CommaLog {
   NpyArray value;
   std::vector<int64_t> t_us;      ///< of the rows that count, ascending
   std::vector<std::size_t> rows;  ///< of value
-  std::size_t left_out = 0;       ///< rows whose time is not after the one before, or that hold NaN
+  std::size_t left_out = 0;       ///< rows that hold NaN, or have the time of another
 };
 
 /// FOLDER/t and FOLDER/value with so many columns; nothing where neither is there. ConfigError where they do not belong

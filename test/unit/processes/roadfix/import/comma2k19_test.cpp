@@ -150,6 +150,29 @@ TEST_CASE("comma2k19: axes, times and the poses of a segment become ours") {
   CHECK_THAT(said(drive), !Catch::Contains("gravity"));  // specific force upwards, as a right IMU has it
 }
 
+TEST_CASE("comma2k19: fixes have the receiver's times where it tells them, and rows may come in any order") {
+  const test::TemporaryFolder folder;
+  write_segment(folder / "s");
+  CHECK_THAT(said(read(folder / "s")), Catch::Contains("gnss is live_gnss_ublox, at the time of its arrival"));
+  Rows rows;
+  for (int i = 0; i < 20; ++i) {
+    rows.push_back({37.5, -122.2, 20.0 + i, static_cast<double>(kFirst_us / 1000) + 100.0 * i - 80.0, 30.0, 0.0});
+  }
+  Rows t = times(20, 0.1);
+  std::swap(t[4], t[5]);
+  std::swap(rows[4], rows[5]);
+  test::write_file(folder / "s/processed_log/GNSS/live_gnss_ublox/value", npy(rows));
+  test::write_file(folder / "s/processed_log/GNSS/live_gnss_ublox/t", npy(t));
+  const Drive drive = read(folder / "s");
+  REQUIRE(drive.gnss.size() == 20);
+  for (int i = 0; i < 20; ++i) {
+    const GnssFix& fix = drive.gnss[static_cast<std::size_t>(i)];
+    CHECK(fix.t_us == kFirst_us + 100'000 * int64_t{i} - 80'000);  // 80 ms before it arrived
+    CHECK(fix.velocity->enu.y() == Approx(20.0 + i));
+  }
+  CHECK_THAT(said(drive), Catch::Contains("at the receiver's own times"));
+}
+
 TEST_CASE("comma2k19: the film becomes pictures at the frames' times") {
   const test::TemporaryFolder folder;
   write_segment(folder / "s");
