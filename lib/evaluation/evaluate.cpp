@@ -298,6 +298,8 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
     transform_estimates(*S, report.scored);
   }
   measure_pairs(report, kind, options);
+  if (report.alignment == Alignment::kNone)
+    report.protection = protection_score(estimate.protection, report.errors, facts.reference.sigma_m);
   report.usable = usable_share(report, options.usable_within);
   if (!report.scored.empty()) {
     const auto tied = tied_pairs(report, unaligned, reference, facts, estimate, kind);

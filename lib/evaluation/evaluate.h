@@ -13,6 +13,7 @@
 #include "evaluation/errors.h"
 #include "evaluation/modes.h"
 #include "evaluation/outages.h"
+#include "evaluation/protection_score.h"
 
 namespace roadfix {
 
@@ -35,6 +36,7 @@ struct EstimateInput {
   Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< m, vehicle axes: from its point to the reference's
   std::vector<double> latencies;                        ///< s, from the time of validity to the time it was logged
   std::vector<ModeSample> modes;                        ///< of the fusion, else empty
+  std::vector<ProtectionSample> protection;             ///< bounds published for it, in order of the poses' time
 };
 
 /// The error beyond which a pose helps nobody on a road; the monitor's limit for "do not use" (lib/health).
@@ -90,6 +92,8 @@ struct ChannelScore {
   /// reference has neither attitude nor path enough for that.
   CovarianceConsistency consistency;
   Availability availability;
+  std::optional<ProtectionScore>
+      protection;                  ///< none where no bound was published, or the frame is not the reference's
   std::optional<double> usable;    ///< share of the time with a pose, valid or coasting, that is `usable_within` of the
                                    ///< truth; none where nothing is scored
   std::optional<Summary> latency;  ///< s

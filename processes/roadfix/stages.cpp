@@ -8,6 +8,7 @@
 #include "config/calibration.h"
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"
+#include "integrity/handler.h"
 #include "vo_tracker/handler.h"
 #include "wheel_odometry/handler.h"
 
@@ -27,6 +28,7 @@ const std::vector<KnownStage>& known_stages() {
       {"vo_tracker", [](const std::filesystem::path& dir) { return make_vo_tracker(dir); }},
       {"wheel_odometry", [](const std::filesystem::path& dir) { return make_wheel_odometry(dir); }},
       {"imm_fusion", [](const std::filesystem::path& dir) { return make_imm_fusion(dir); }},
+      {"integrity", [](const std::filesystem::path& dir) { return make_integrity(dir); }},
   };
   return kStages;
 }

@@ -83,20 +83,21 @@ class Runs:
 
         return self.once(("import", drive), run)
 
-    def fleet(self, stages, scenario, seeds, *words, aligned=()):
+    def fleet(self, stages, scenario, seeds, *words, aligned=(), config=None):
         """(figures of every channel, folder) of a scenario with each of the seeds 1 to `seeds`, in their order, by `roadfix fleet`. Words are KEY=VALUE;
-        `aligned` has pairs (channel, alignment) that differ from what the channel's frame suggests. The errors of a channel lie in
+        `aligned` has pairs (channel, alignment) that differ from what the channel's frame suggests, `config` is a folder with a tuning. The errors of a channel lie in
         report/CHANNEL_errors.csv of its drive's folder."""
 
         def run():
-            path = self.folder("fleet", scenario, *words)
+            path = self.folder("fleet", scenario, *words, *(("tuned",) if config else ()))
+            tuning = ("--config", config) if config else ()
             align = [word for channel, alignment in aligned for word in ("--align", f"{channel}={alignment}")]
-            self.roadfix("fleet", "run", scenario, f"seeds=1..{seeds}", *words, "--stages", stages, *align, "--keep", "errors", "--engine", "local",
-                         "--out", path, "--overwrite")
+            self.roadfix("fleet", "run", scenario, f"seeds=1..{seeds}", *words, "--stages", stages, *align, *tuning, "--keep", "errors",
+                         "--engine", "local", "--out", path, "--overwrite")
             folders = [path / "tasks" / f"{index:06}" for index in range(seeds)]
             return [(json.loads((folder / "result.json").read_text())["figures"]["channels"], folder) for folder in folders]
 
-        return self.once(("fleet", stages, scenario, seeds, words, aligned), run)
+        return self.once(("fleet", stages, scenario, seeds, words, aligned, config), run)
 
     def folder(self, *words):
         name = "_".join(str(word).lstrip("-").replace(",", "_") for word in words) or "run"

@@ -144,7 +144,7 @@ storage)
 report)
   # The page holds everything and fetches nothing; what is pooled is the sum of the drives.
   drives=(tunnel_dark camera=none seeds=1..3)
-  flags=(--stages wheel_odometry,gnss_ins_ekf)
+  flags=(--stages wheel_odometry,gnss_ins_ekf,integrity)
   echo 'no log' >"$folder/bad.lcm"
   "$roadfix" fleet run "${drives[@]}" "$folder/bad.lcm" "${flags[@]}" --out "$run" >/dev/null 2>&1 && fail 'a bad log ends well'
   "$roadfix" fleet report "$run" >"$folder/out" || fail 'report'
@@ -164,8 +164,13 @@ for task in data["tasks"][:3]:
     assert (run / task["page"]).is_file(), task
 for name, channel in data["channels"].items():
     counts = [f["bounds"][name] for f in well]
-    assert channel["samples"] == sum(c["samples"] for c in counts) == sum(cell[2] for cell in channel["cells"]) > 1000
-    assert channel["exceeded"] == sum(c["exceeded"] for c in counts)
+    sigma = channel["bounds"][-1]
+    assert sigma["samples"] == sum(c["samples"] for c in counts) == sum(cell[2] for cell in sigma["cells"]) > 1000
+    assert sigma["exceeded"] == sum(c["exceeded"] for c in counts)
+    levels = channel["bounds"][:-1]
+    assert len(levels) == (6 if name == "POSE_INS" else 0), name
+    for level in levels:
+        assert level["samples"] == sum(f["channels"][name]["protection"]["samples"] for f in well) == sum(cell[2] for cell in level["cells"]) > 1000
     ends = [o["horizontal_m"] for f in well for o in f["channels"][name]["outages"]["each"]]
     assert channel["outages_m"] == ends and len(ends) == 3, name
 CHECK

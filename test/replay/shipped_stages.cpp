@@ -6,6 +6,7 @@
 #include "config/config.h"
 #include "gnss_ins_ekf/handler.h"
 #include "imm_fusion/handler.h"
+#include "integrity/handler.h"
 #include "simulation/scenarios.h"
 #include "support/picture_drive.h"
 #include "support/shared_data.h"
@@ -106,6 +107,7 @@ const std::vector<ShippedStage>& shipped_stages() {
       {"gnss_ins_ekf", demo_calibration(), [](const Calibration& c) { return make_gnss_ins_ekf(c, {}); }, demo},
       {"wheel_odometry", demo_calibration(), [](const Calibration& c) { return make_wheel_odometry(c, {}); }, demo},
       {"imm_fusion", demo_calibration(), [](const Calibration& c) { return make_imm_fusion(c, {}); }, estimates},
+      {"integrity", demo_calibration(), [](const Calibration& c) { return make_integrity(c, {}); }, estimates},
       {"vo_tracker, stereo", picture_car(true), [](const Calibration& c) { return make_tracker(c, VoMode::kKeyframe); },
        picture_drive},
       {"vo_tracker, mode msckf", picture_car(false),

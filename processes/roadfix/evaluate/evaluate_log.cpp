@@ -86,6 +86,7 @@ EvaluationReport evaluate_log(const EvaluationRequest& request) {
   for (const std::string& channel : chosen_channels(request, log)) {
     EstimateInput input = estimate_input(channel, std::move(log.poses.at(channel)), reference, truth, report);
     if (channel == "POSE_FUSED") input.modes = log.fusion.modes;
+    input.protection = std::move(log.protection[channel]);
     report.channels.push_back(
         evaluate_channel(report.reference, report.facts, std::move(input), options_of(request, channel)));
   }

@@ -13,6 +13,7 @@
 #include "geodesy/enu_change.h"
 #include "geometry/frames.h"
 #include "roadfix/config_t.hpp"
+#include "roadfix/protection_level_t.hpp"
 
 namespace roadfix {
 namespace {
@@ -117,11 +118,20 @@ void read_facts(const config_t& config, const std::filesystem::path& path, Evalu
   log.has_facts = true;
 }
 
-/// The checks of the three types that are read here.
+constexpr std::string_view kProtection = "PROTECTION_";
+
+ProtectionSample protection_of(const protection_level_t& m) {
+  ProtectionSample sample{m.pose_utime, m.risk, {}, {m.alert_along_m, m.alert_across_m, m.alert_up_m}, m.usable != 0};
+  for (std::size_t r = 0; r < m.risk.size(); ++r) sample.level.emplace_back(m.along_m[r], m.across_m[r], m.up_m[r]);
+  return sample;
+}
+
+/// The checks of the types that are read here.
 struct Checks {
   MessageCheck pose = Schema::built_in().check_of("pose_t");
   MessageCheck config = Schema::built_in().check_of("config_t");
   MessageCheck fusion = Schema::built_in().check_of("fusion_state_t");
+  MessageCheck protection = Schema::built_in().check_of("protection_level_t");
 };
 
 /// Collects what a log holds: add() takes note of an event and says whether it is a message of its channel's type;
@@ -135,8 +145,12 @@ class LogCollector {
     const bool config = channel == "CONFIG_DRIVE";
     const bool fusion = channel == "FUSION_STATE";
     if (channel == kReferenceChannel || channel.starts_with("POSE_")) log_.pose_channels.insert(channel);
-    if (!is_pose(channel) && !config && !fusion) return true;
-    const MessageCheck& check = config ? checks_.config : fusion ? checks_.fusion : checks_.pose;
+    const bool protection = channel.starts_with(kProtection);
+    if (!is_pose(channel) && !config && !fusion && !protection) return true;
+    const MessageCheck& check = config       ? checks_.config
+                                : fusion     ? checks_.fusion
+                                : protection ? checks_.protection
+                                             : checks_.pose;
     if (check(event.data) != CheckResult::kOk) return false;
     const Header header = *read_header(event.data);
     Noted& noted = noted_[channel];
@@ -155,6 +169,9 @@ class LogCollector {
           read_facts(decode<config_t>(event.data), reader_.path(), log_);
         } else if (channel == "FUSION_STATE") {
           append(decode<fusion_state_t>(event.data), log_.fusion);
+        } else if (channel.starts_with(kProtection)) {
+          log_.protection["POSE_" + channel.substr(kProtection.size())].push_back(
+              protection_of(decode<protection_level_t>(event.data)));
         } else {
           builder.add(decode<pose_t>(event.data), event.timestamp_us);
         }

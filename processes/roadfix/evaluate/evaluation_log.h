@@ -40,6 +40,7 @@ struct EvaluationLog {
   Calibration calibration;
   std::map<std::string, PoseStream> poses;  ///< REFERENCE among them
   std::set<std::string> pose_channels;      ///< POSE_* and REFERENCE that the log holds, read or not
+  std::map<std::string, std::vector<ProtectionSample>> protection;  ///< by the channel of the poses that it bounds
   FusionSeries fusion;
   std::vector<std::string> notes;  ///< what a reader of the figures must know: damage, missing facts
 };

@@ -104,6 +104,36 @@ void add_transitions(const ChannelScore& c, Json& json) {
   }
 }
 
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json protection_json(const ProtectionScore& p) {
+  Json risks = Json::array();
+  for (const RiskScore& r : p.risks) {
+    Json diagrams = Json::array();
+    for (const BoundHistogram& diagram : r.diagram) {
+      Json cells = Json::array();
+      for (const auto& [cell, count] : diagram.cells()) cells.push_back({cell.first, cell.second, count});
+      diagrams.push_back(std::move(cells));
+    }
+    risks.push_back({{"risk", r.risk},
+                     {"misleading", r.misleading},
+                     {"misleading_by_axis", r.by_axis},
+                     {"available", r.available},
+                     {"hazardous", r.hazardous},
+                     {"median_m", vector_json(r.median)},
+                     {"stanford", std::move(diagrams)}});
+  }
+  return {{"samples", p.samples},
+          {"unbounded", p.unbounded},
+          {"independent", p.independent},
+          {"interval_s", p.interval_s},
+          {"usable", p.usable},
+          {"interruptions", p.interruptions},
+          {"longest_misled_s", p.longest_misled_s},
+          {"error_p95_m", vector_json(p.error_p95)},
+          {"risks", std::move(risks)}};
+}
+
 Json channel_json(const ChannelScore& c) {
   Json json = {{"alignment", name_of(c.alignment)},
                {"scale", c.similarity.scale},
@@ -131,6 +161,7 @@ Json channel_json(const ChannelScore& c) {
                           {"invalid", c.availability.invalid},
                           {"silent", c.availability.silent}};
   if (c.usable) json["availability"]["usable"] = *c.usable;
+  if (c.protection) json["protection"] = protection_json(*c.protection);
   if (c.latency) json["latency_s"] = summary(*c.latency);
   return json;
 }

@@ -98,6 +98,22 @@ std::string outage_lines(const ChannelScore& c) {
   return text;
 }
 
+/// Along, across, up.
+std::string three(const Eigen::Vector3d& v) { return number(v.x()) + " " + number(v.y()) + " " + number(v.z()); }
+
+std::string protection_lines(const ProtectionScore& p) {
+  const auto share = [&](int64_t n) { return static_cast<double>(n) / static_cast<double>(p.samples + p.unbounded); };
+  std::string text = fmt::format("  protection: {} samples ({:.0f} independent), {} without a bound; error 95 % {} m\n",
+                                 p.samples, p.independent, p.unbounded, three(p.error_p95));
+  for (const RiskScore& r : p.risks) {
+    text += fmt::format("    risk {:g}: median level {} m along, across, up; available {}; {} misleading, {} hazardous",
+                        r.risk, three(r.median), percent(share(r.available)), r.misleading, r.hazardous);
+    text += fmt::format("; proved at 95 %: below {:.2g}\n",
+                        risk_bounded_at(independent_events(r.misleading, p.samples, p.independent), p.independent));
+  }
+  return text + fmt::format("    usable {} of the time, {} interruptions\n", percent(share(p.usable)), p.interruptions);
+}
+
 std::string channel_text(const ChannelScore& c) {
   std::string text = fmt::format("{}  alignment: {}", c.channel, name_of(c.alignment));
   if (c.alignment == Alignment::kSim3) text += fmt::format(", scale {}", number(c.similarity.scale));
@@ -110,6 +126,7 @@ std::string channel_text(const ChannelScore& c) {
   text += fmt::format("  valid {}, coasting {}, invalid {}, silent {} of the time", percent(a.valid),
                       percent(a.coasting), percent(a.invalid), percent(a.silent));
   text += c.usable ? fmt::format("; usable {}\n", percent(*c.usable)) : "\n";
+  if (c.protection) text += protection_lines(*c.protection);
   if (c.latency)
     text += fmt::format("  latency {} s median, {} s max\n", number(c.latency->median), number(c.latency->max));
   return text + "\n";

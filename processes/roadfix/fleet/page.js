@@ -48,7 +48,7 @@ function shares(host, sets, label, line) {
 const setsOf = (column) => names.map((name) => ({ values: valuesOf(name, column), color: colorOf(name) }));
 
 function drawBounds() {
-  const host = byId("bounds"), channel = data.channels[byId("bound-channel").value];
+  const host = byId("bounds"), [name, which] = byId("bound-channel").value.split(" "), channel = (data.channels[name] || { bounds: [] }).bounds[which];
   if (!channel || !channel.cells.length) { host.textContent = "nothing to show"; return; }
   byId("bound-facts").textContent = `Bound: ${channel.bound}; ${channel.exceeded} of ${channel.samples} above it (${(100 * channel.exceeded / channel.samples).toPrecision(2)} %).`;
   const edge = (bin) => data.bins.first * 10 ** (bin / data.bins.per_decade);
@@ -103,7 +103,8 @@ function start() {
   if (bad.length > 50) node("li", {}, byId("notes"), `and ${bad.length - 50} more without a result`);
   columns.forEach((column, i) => node("option", { value: i }, byId("figure"), column));
   for (const name of names) {
-    for (const list of ["bound-channel", "drive-channel"]) node("option", { value: name }, byId(list), name);
+    data.channels[name].bounds.forEach((b, i) => { if (b.samples) node("option", { value: `${name} ${i}` }, byId("bound-channel"), `${name}, ${b.bound}`); });
+    node("option", { value: name }, byId("drive-channel"), name);
     const entry = node("span", {}, byId("legend"));
     node("i", { style: `background:${colorOf(name)}` }, entry);
     entry.append(name);

@@ -39,6 +39,7 @@ void add_outages(const Json& outages, FleetChannel& channel) {
 Json add_channel(const Json& figures, FleetChannel& channel) {
   ++channel.drives;
   add_outages(figures.at("outages"), channel);
+  if (figures.contains("protection")) channel.protection.add(figures.at("protection"));
   const double available = number(figures, "/availability/valid") + number(figures, "/availability/coasting");
   channel.available.push_back(available);
   if (number(figures, "/scored") <= 0.0) return {nullptr, nullptr, nullptr, nullptr, nullptr, available};
@@ -95,8 +96,10 @@ Json bounds_json(const FleetSummary& summary) {
   for (const auto& [name, c] : summary.channels) {
     Json cells = Json::array();
     for (const auto& [cell, count] : c.cells) cells.push_back({cell.first, cell.second, count});
-    json[name] = {{"bound", c.bound},          {"samples", c.samples},    {"exceeded", c.exceeded},
-                  {"cells", std::move(cells)}, {"outages_m", c.outage_m}, {"outages_percent", c.outage_percent}};
+    Json bounds = c.protection.diagrams();
+    bounds.push_back(
+        {{"bound", c.bound}, {"samples", c.samples}, {"exceeded", c.exceeded}, {"cells", std::move(cells)}});
+    json[name] = {{"bounds", std::move(bounds)}, {"outages_m", c.outage_m}, {"outages_percent", c.outage_percent}};
   }
   return json;
 }
@@ -141,6 +144,8 @@ std::string fleet_table(const RunFolder& run, const FleetSummary& s) {
   text += fmt::format("{:<14} {:>6}  {}  {}  {}  {:>8}  {:>9}  {:>9}\n", "channel", "drives", columns, columns, columns,
                       "median", "mean", "3 sigma");
   for (const auto& [name, channel] : s.channels) text += channel_row(name, channel);
+  for (const auto& [name, channel] : s.channels)
+    if (!channel.protection.empty()) text += channel.protection.text(name);
   return text;
 }
 

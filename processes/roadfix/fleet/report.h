@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "roadfix/fleet/protection_pool.h"
 #include "roadfix/fleet/run_folder.h"
 #include "statistics/summary.h"
 
@@ -19,7 +20,8 @@ struct FleetChannel {
   std::vector<double> nees, within_3sigma, available;  ///< of each drive
   std::vector<double> outage_m, outage_percent;        ///< of every outage of every drive, at its end
   int missing_outages = 0;
-  std::string bound;  ///< what the errors are held against
+  ProtectionPool protection;  ///< of levels published for it
+  std::string bound;          ///< what the horizontal errors are held against where there are none
   std::map<std::pair<int, int>, int64_t> cells;
   int64_t samples = 0, exceeded = 0;
 };

@@ -48,7 +48,8 @@ bool keeps(const FleetPlan& plan, const std::string& what) {
 /// run itself.
 bool is_output(std::string_view channel) {
   return channel.starts_with("POSE_") || channel.ends_with("_STATUS") || channel.starts_with("AIDING_") ||
-         channel == "VO_FEATURES" || channel == "FUSION_STATE" || channel == "VO_RESTART";
+         channel.starts_with("PROTECTION_") || channel == "VO_FEATURES" || channel == "FUSION_STATE" ||
+         channel == "VO_RESTART";
 }
 
 /// XXH64 over the stamps and bytes of each output channel, in the order of the log.
