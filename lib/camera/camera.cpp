@@ -17,7 +17,7 @@ struct Distorted {
   Eigen::Matrix2d J;
 };
 
-/// OpenCV documentation, "Camera Calibration and 3D Reconstruction", without the rational terms.
+/// (K.1.3), (K.1.5): OpenCV documentation, "Camera Calibration and 3D Reconstruction", without the rational terms.
 Distorted distort_radtan(const std::array<double, 5>& c, const Eigen::Vector2d& n) {
   const double x = n.x(), y = n.y(), r2 = n.squaredNorm();
   const double k1 = c[0], k2 = c[1], p1 = c[2], p2 = c[3], k3 = c[4];
@@ -32,7 +32,7 @@ Distorted distort_radtan(const std::array<double, 5>& c, const Eigen::Vector2d& 
   return d;
 }
 
-/// Kannala and Brandt, 2006, equation 6, as OpenCV's fisheye module has it.
+/// (K.1.4), (K.1.6): Kannala and Brandt, 2006, equation 6, as OpenCV's fisheye module has it.
 Distorted distort_equidistant(const std::array<double, 5>& c, const Eigen::Vector2d& n) {
   const double r = n.norm();
   if (r < 1e-8) return {n, Eigen::Matrix2d::Identity()};

@@ -3,7 +3,7 @@
 ///
 /// Two kinds of image coordinates: a *pixel* is a raw image coordinate (u to the right, v down, the centre of the first
 /// pixel at 0 0); *normalised* coordinates are (x/z, y/z) of a point in camera axes, without distortion. Estimators use
-/// normalised coordinates: undistortion is computed once per feature.
+/// normalised coordinates: undistortion is computed once per feature. Derivation: lib/camera/MODEL.md, (K.n).
 #pragma once
 
 #include <Eigen/Dense>

@@ -57,7 +57,7 @@ int64_t TimestampFilter::filter(int64_t stamp_us) {
   } else {
     outliers_ = 0;
   }
-  // Gains of the growing-memory least-squares line over k samples (Brookner, Tracking and Kalman Filtering Made Easy,
+  // (K.3.2): gains of the growing-memory line over k samples (Brookner, Tracking and Kalman Filtering Made Easy,
   // 1998, 1.2.10).
   ++frames_;
   const auto k = static_cast<double>(std::min(frames_, kMaxSamples));

@@ -2,7 +2,7 @@
 /// jitter.
 ///
 /// Recursive least-squares line over the frames with a limited window (so that clock drift is followed): t_k = phase +
-/// k period. Skipped frames count as whole periods.
+/// k period, MODEL.md (K.3.1), (K.3.2). Skipped frames count as whole periods.
 #pragma once
 
 #include <cstdint>

@@ -90,7 +90,7 @@ struct CameraCalibration {
   std::optional<CameraMounting> mounting;
 };
 
-/// How well two eyes together are calibrated. Pictures tell neither.
+/// How well two eyes together are calibrated. Pictures show neither.
 struct StereoCalibration {
   std::optional<double> scale_std;  ///< relative, of lengths: of focal length times distance of the eyes
   std::optional<double> focal_std;  ///< relative, of the focal length: of angles
@@ -130,11 +130,11 @@ struct Calibration {
   /// show.
   [[nodiscard]] Eigen::Vector2d turn_to_forward() const;
 
-  /// The rear axle's centre: measured where wheels.lever_arm_body_m tells it; nought where the body's origin is the
+  /// The rear axle's centre: measured where wheels.lever_arm_body_m gives it; zero where the body's origin is the
   /// axle; else unknown.
   [[nodiscard]] PlaceOnVehicle rear_axle() const;
 
-  /// The GNSS antenna's phase centre: exactly where gnss.lever_arm_body_m tells it unless a std stands beside it; else
+  /// The GNSS antenna's phase centre: exactly where gnss.lever_arm_body_m gives it unless a std stands beside it; else
   /// unknown.
   [[nodiscard]] PlaceOnVehicle antenna() const;
 };
@@ -144,7 +144,7 @@ Calibration load_calibration(const std::filesystem::path& vehicle_dir);
 Calibration parse_calibration(const std::string& text, const std::string& file);
 std::string calibration_text(const Calibration& calibration);
 
-/// What the calibration tells replaces a default; what it does not know leaves it.
+/// A value of the calibration replaces a default; an absent one leaves it.
 template <class T>
 void take_known(const std::optional<T>& from, T& to) {
   if (from) to = *from;

@@ -49,7 +49,7 @@ std::optional<Similarity> align_yaw(const Moments& m) {
   return about_means(m, exp_so3(Eigen::Vector3d(0.0, 0.0, std::atan2(sine, cosine))), 1.0);
 }
 
-/// Umeyama 1991, equations (40) to (43).
+/// (E.1.1): Umeyama 1991, equations (40) to (43).
 std::optional<Similarity> align_umeyama(const Moments& m, bool with_scale) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m.cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d& d = svd.singularValues();

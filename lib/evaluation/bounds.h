@@ -1,5 +1,5 @@
 /// Errors against the bounds that were claimed for them, counted so that the counts of many drives can be added: the
-/// Stanford diagram (Tossaint et al., The Stanford-ESA Integrity Diagram, Navigation 54, 2007).
+/// Stanford diagram (Tossaint et al., The Stanford-ESA Integrity Diagram, Navigation 54, 2007). MODEL.md (E.3.2).
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,7 @@
 
 namespace roadfix {
 
-/// One kind of error of one drive.
+/// One kind of error of one drive, (E.3.1).
 struct ConsistencyRow {
   int samples = 0;
   int unusable = 0;            ///< covariances that are not positive definite

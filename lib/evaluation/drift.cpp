@@ -19,7 +19,7 @@ std::vector<double> norms(const std::vector<PoseError>& errors) {
   return values;
 }
 
-/// Motion of the estimate from i to j, seen against the reference's.
+/// Motion of the estimate from i to j, seen against the reference's, (E.4.3).
 SE3 relative_error(const PosePair& i, const PosePair& j) {
   const SE3 reference = i.reference.T_frame_vehicle.inverse() * j.reference.T_frame_vehicle;
   const SE3 estimate = i.estimate.T_frame_vehicle.inverse() * j.estimate.T_frame_vehicle;

@@ -1,4 +1,4 @@
-/// Errors of single poses and their figures per axis of the vehicle.
+/// Errors of single poses and their figures per axis of the vehicle. MODEL.md (E.2.1), (E.2.2).
 #pragma once
 
 #include <optional>

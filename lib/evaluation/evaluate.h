@@ -1,4 +1,4 @@
-/// The whole evaluation of one drive: a reference, what may be scored of it, and one report per estimate.
+/// The whole evaluation of one drive: a reference, what may be scored of it, and one report per estimate. MODEL.md.
 #pragma once
 
 #include <optional>

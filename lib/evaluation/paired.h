@@ -1,7 +1,7 @@
 /// Two estimators, or two builds of one, on the same drives: is one worse?
 ///
 /// Every value is a cost: zero or more, smaller is better. A change is counted as ln((b + floor) / (a + floor)): a
-/// share, whatever the size of the drive's error, and nothing where both are far below the floor.
+/// share (MODEL.md, (E.6.1)), whatever the size of the drive's error, and nothing where both are far below the floor.
 #pragma once
 
 #include <cstddef>

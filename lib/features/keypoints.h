@@ -38,11 +38,11 @@ std::unique_ptr<KeypointDetector> make_sift(const FrontEndConfig& config);
 /// W grey in [0, 1]; outputs `output_det` 1 x 65 x H/8 x W/8 (raw) and `output_desc` 1 x N x H/8 x W/8.
 std::unique_ptr<KeypointDetector> make_superpoint(const FrontEndConfig& config, std::span<const uint8_t> weights);
 /// Potje, Cadar, Araujo, Martins, Nascimento, XFeat, 2024: the backbone as ONNX. Input 1 x 1 (or 3) x H x W in [0, 1],
-/// H and W multiples of 32; three outputs at an eighth of that size, told apart by their channels: 65 keypoint logits,
+/// H and W multiples of 32; three outputs at an eighth of that size, by their channels: 65 keypoint logits,
 /// 1 reliability in [0, 1], N descriptors.
 std::unique_ptr<KeypointDetector> make_xfeat(const FrontEndConfig& config, std::span<const uint8_t> weights);
 /// Zhao, Wu, Chen, Chen, Xu, Lee, ALIKED, 2023, as ONNX. Input as XFeat's. Either two maps: scores 1 x 1 x H x W and
-/// descriptors 1 x N x H/c x W/c (ALIKE; ALIKED without its deformable head); or three lists, told apart by their
+/// descriptors 1 x N x H/c x W/c (ALIKE; ALIKED without its deformable head); or three lists, distinguished by their
 /// sizes: keypoints K x 2 in [-1, 1] from corner pixel to corner pixel, scores K, descriptors K x N, each with or
 /// without a leading 1.
 std::unique_ptr<KeypointDetector> make_aliked(const FrontEndConfig& config, std::span<const uint8_t> weights);

@@ -9,7 +9,7 @@
 
 namespace roadfix {
 
-/// Channels of the first picture-shaped input (1 x C x H x W) that an ONNX file declares; 1 where it does not tell.
+/// Channels of the first picture-shaped input (1 x C x H x W) that an ONNX file declares; 1 where it declares none.
 int declared_channels(std::span<const uint8_t> onnx);
 
 class Network {

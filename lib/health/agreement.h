@@ -1,5 +1,5 @@
 /// Do two estimates contradict each other? Absolute ones in place, all of them in how far they moved: a frame of its
-/// own hides where an estimate is, but not how it moves.
+/// own hides where an estimate is, but not how it moves. MODEL.md (H.3.1), (H.3.2).
 #pragma once
 
 #include <optional>

@@ -115,7 +115,7 @@ bool ChannelMonitor::is_fresh(int64_t now_us) const {
   return !window_.empty() && seconds(now_us - window_.back().now_us) <= std::max(kStale, 1.5 * silent_after());
 }
 
-/// The rate that the stamps show, once they have shown it long and regularly enough.
+/// The rate that the stamps show (MODEL.md, section 1), once they have shown it long and regularly enough.
 void ChannelMonitor::learn_rate(int64_t now_us) {
   if (!periodic_ || configured_ || window_.size() < kMinMessages) return;
   if (seconds(now_us - first_us_) < limits_.learn) return;
@@ -153,7 +153,7 @@ bool ChannelMonitor::silent(int64_t now_us) const {
   return seconds(now_us - window_.back().now_us) > silent_after();
 }
 
-/// 0: not known. A fast channel may miss a message or two; a slow one is missed soon after it was due.
+/// (H.1.4). 0: not known. A fast channel may miss a message or two; a slow one is missed soon after it was due.
 double ChannelMonitor::silent_after() const {
   if (!expected_hz_) return 0.0;
   const double period = 1.0 / *expected_hz_;

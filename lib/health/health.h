@@ -1,5 +1,5 @@
 /// What the monitor decides, without bus, clock or file: from what arrived and when it follows whether the estimate may
-/// be used, and why not.
+/// be used, and why not. Derivation: lib/health/MODEL.md, (H.n).
 ///
 /// Time is data: `now` comes with every call and never runs backwards here; live it is the clock, of a log the time of
 /// recording. Decisions fall on a grid of 0.1 s, so that the same messages at the same times give the same reports.

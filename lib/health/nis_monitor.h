@@ -14,7 +14,7 @@ namespace roadfix {
 
 struct NisReport {
   std::string source;
-  double ratio = 0.0;  ///< mean of NIS over mean of its degrees of freedom, of what was accepted; consistent: about one
+  double ratio = 0.0;  ///< (H.4.1): mean of NIS over mean of its degrees of freedom, of what was accepted
   int used = 0;        ///< in the window
   int refused = 0;     ///< gated, in the window
 };

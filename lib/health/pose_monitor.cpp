@@ -49,7 +49,7 @@ void PoseMonitor::add(int64_t now_us, const PoseFacts& facts) {
   store(facts);
 }
 
-/// Compares the estimate with the place that its velocity predicts.
+/// Compares the estimate with the place that its velocity predicts, (H.2.1).
 void PoseMonitor::detect_jump(int64_t now_us, const PoseFacts& facts) {
   if (!newest_ || !usable() || facts.odometry.validity == Validity::kInvalid || !finite(facts.odometry) ||
       facts.run != newest_->run) {

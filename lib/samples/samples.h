@@ -44,7 +44,7 @@ struct GnssFix {
   std::optional<double> correction_age;  ///< s
 };
 
-/// Signed: the speeds carry their sign. Otherwise they are magnitudes, with the gear's direction where the car tells
+/// Signed: the speeds carry their sign. Otherwise they are magnitudes, with the gear's direction where the car gives
 /// it.
 enum class WheelDirection { kUnknown, kForward, kReverse, kSigned };
 
@@ -61,7 +61,7 @@ struct MagSample {
   Eigen::Vector3d field = Eigen::Vector3d::Zero();  ///< T, vehicle axes
 };
 
-/// How far an estimate may be trusted.
+/// How far an estimate may be used.
 enum class Validity { kInvalid, kCoasting, kValid };
 
 /// A pose with velocity and covariance in some frame: what estimators give, what the fusion takes, what the evaluation

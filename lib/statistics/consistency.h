@@ -27,7 +27,7 @@ class ConsistencyAccumulator {
 
   [[nodiscard]] int count() const { return count_; }
   [[nodiscard]] int total_dof() const { return total_dof_; }
-  /// Sum over total degrees of freedom: one for honest covariances, more for overconfident ones. Zero without samples.
+  /// Sum over total degrees of freedom: one where they are consistent, more where too small. Zero without samples.
   [[nodiscard]] double ratio() const;
   [[nodiscard]] Band band(double confidence = 0.999) const;
   [[nodiscard]] bool consistent(double confidence = 0.999) const { return band(confidence).holds(ratio()); }

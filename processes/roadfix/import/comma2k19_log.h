@@ -10,7 +10,7 @@
 
 namespace roadfix {
 
-/// Seconds since the device's start to microseconds UTC, as far as the segment tells.
+/// Seconds since the device's start to microseconds UTC, as far as the segment has it.
 struct CommaClock {
   double utc_minus_boot = 0.0;  ///< s
   [[nodiscard]] int64_t utime(double boot_s) const;

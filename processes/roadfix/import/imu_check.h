@@ -9,7 +9,7 @@
 
 namespace roadfix {
 
-/// What a user should set or correct, and why; empty where all agrees, or the drive does not tell: one that stands has no
+/// What a user should set or correct, and why; empty where all agrees, or nothing shows: one that stands has no
 /// course, and a mounting whose std_deg is wide may be any.
 std::vector<std::string> imu_remarks(const Drive& drive);
 

@@ -35,7 +35,7 @@ KittiCalib read_calib(const fs::path& folder, const std::string& name) {
 
 SE3 transform_of(const KittiCalib& calib) { return {Eigen::Quaterniond(calib.rotation("R")), calib.vector("T")}; }
 
-/// 2 m of GNSS height are as likely as 1 m of its place: the kit tells the accuracy of north and east alone.
+/// 2 m of GNSS height are as likely as 1 m of its place: the kit gives the accuracy of north and east alone.
 constexpr double kHeightOverPlace = 2.0;
 
 GnssFix fix_of(int64_t t_us, const OxtsPacket& packet) {
