@@ -1,5 +1,5 @@
 /// Corners distributed over the whole image: FAST proposes candidates, the smaller eigenvalue of the gradient matrix
-/// ranks them (Shi and Tomasi, 1994), with a minimum distance between corners.
+/// ranks them (Shi and Tomasi, 1994), with a minimum distance between corners. MODEL.md (T.1.1), (T.1.2).
 #pragma once
 
 #include <Eigen/Dense>

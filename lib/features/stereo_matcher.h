@@ -1,6 +1,6 @@
 /// Matches points of the left image in the right one: a coarse search along the epipolar curve, then alignment with
 /// affine shape (slanted road surfaces are sheared), then a test of the epipolar distance. Works for any two
-/// overlapping cameras, without rectification.
+/// overlapping cameras, without rectification. MODEL.md (T.3.1), (T.3.2).
 #pragma once
 
 #include <Eigen/Dense>
