@@ -25,6 +25,27 @@ def missing(root, page):
     return lost
 
 
+def searches(page):
+    """What docs/PAPERS.md tells to search for: the last column of its table of equations."""
+    return re.findall(r"(?m)^\|[^|]*\|[^|]*\|[^|]*\| `([^`]+)` \|$", page)
+
+
+def not_found(root, texts):
+    """Those that no source file of lib has in one line."""
+    sources = "\n".join(path.read_text() for path in (root / "lib").rglob("*") if path.suffix in (".h", ".cpp"))
+    return [text for text in texts if text not in sources]
+
+
+class Equations(unittest.TestCase):
+    def test_every_equation_is_where_the_table_of_papers_says(self):
+        texts = searches((ROOT / "docs/PAPERS.md").read_text())
+        self.assertGreater(len(texts), 15)
+        self.assertEqual(not_found(ROOT, texts), [])
+
+    def test_an_equation_that_is_nowhere_is_found_missing(self):
+        self.assertEqual(not_found(ROOT, ["Ock et al. 2020 (9)", "Ock et al. 2020 (99)"]), ["Ock et al. 2020 (99)"])
+
+
 class Links(unittest.TestCase):
     def test_every_page_points_to_what_is_there(self):
         for page in PAGES:
