@@ -26,6 +26,7 @@ constexpr double kParkedYaw = 0.3 * kDegree;
 constexpr double kNegligible = 1e-9;  // share of a hypothesis that is dropped
 constexpr double kSameHeading = 15.0 * kDegree;
 constexpr double kStartPosition = 1000.0, kStartVelocity = 100.0, kStartTilt = 0.5;  // m, m/s, rad: nothing is known
+constexpr double kEarthRate = 7.3e-5;                                                // rad/s
 constexpr double kLocalPlace = 1e-4;  // m: where a local frame begins is a convention
 
 BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double yaw_std) {
@@ -92,6 +93,12 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   x.p_imu_antenna = config_.facts.p_imu_antenna;
   if (!s.local) x.nav.position = s.antenna - x.nav.q_level_imu * x.p_imu_antenna;
   BaseVector sigmas = start_sigmas(config_, s, yaw_std);
+  // Wheels or pictures say that it stands: what the gyro reads is bias, but for the Earth's rate.
+  if (s.local && s.standing) {
+    x.gyro_bias = s.mean_gyro;
+    const double noise = config_.facts.imu.gyro / std::sqrt(inertial::StandstillDetector::kBlock);
+    sigmas.segment<3>(kGyroBias).setConstant(std::hypot(noise, kEarthRate));
+  }
   if (s.memory) recall(*s.memory, x, sigmas);
   filters_.emplace_back(config_, earth, false);
   log_weights_.push_back(log_weight);
@@ -115,7 +122,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   if (!s.local)
     (void)filter.fuse(AidingSource::kGnssPosition, s.t_us,
                       gnss_position(filter.state(), BodyMotion(), s.antenna, s.antenna_cov, 0.0), open);
-  if (s.standing)
+  if (s.standing && !s.local)
     (void)filter.fuse(AidingSource::kZeroRate, s.t_us,
                       zero_rate(filter.state(), s.mean_gyro, filter.earth().rate(), config_.aiding.zero_rate_std),
                       open);

@@ -39,7 +39,7 @@ class CameraControl {
   void forget_poses(State& state);
 
   /// Median motion of the tracks over a quarter to half a second up to t_us (the imu's clock), before pictures are used, and what it
-  /// is at most while the camera stands, px; nothing without pictures or tracks.
+  /// is at most while the camera stands, px, (N.6.16); nothing without pictures or tracks.
   struct Flow {
     double median_px = 0.0, still_px = 0.0;
   };

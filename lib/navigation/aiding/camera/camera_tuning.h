@@ -15,7 +15,7 @@ struct CameraTuning {
   double trial = 1.0;           ///< s of pictures that must fit before the camera is used, the first time
   double trial_again = 5.0;     ///< s, after it was found unfit
   /// rad and m, of the camera's mounting, whatever the calibration claims: a bracket that was knocked is off by two
-  /// degrees, and a prior that is a little too wide costs nothing, as the fixes show the rest in seconds (EVIDENCE.md).
+  /// degrees, and a prior that is a little too wide costs nothing, as the fixes show the rest in seconds (N.6.15).
   double turn_floor = 0.009, place_floor = 0.02;
   TrackTuning tracks;
 };
