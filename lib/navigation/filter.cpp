@@ -15,10 +15,24 @@ constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
 
 double square(double x) { return x * x; }
 
+// How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they differ from one turn-on to the next, a receiver that follows a reflection or is
+// dragged off.
+StepDetector::Sizes typical_steps(const VehicleFacts& v) {
+  constexpr double kScale = 0.02, kDisplacement = 5.0, kDrag = 0.5;  // 1, m, m/s
+  StepDetector::Sizes s;
+  s << kScale, Eigen::Vector3d::Constant(v.gyro_bias_std), Eigen::Vector3d::Constant(v.accel_bias_std),
+      Eigen::Vector3d::Constant(kDisplacement), Eigen::Vector3d::Constant(kDrag);
+  return s;
+}
+
 }  // namespace
 
 Filter::Filter(const NavigationConfig& config, const inertial::Earth& earth, bool camera)
-    : config_(config), earth_(earth), state_(camera), scratch_(Eigen::VectorXd::Zero(state_.P().rows())) {}
+    : config_(config),
+      earth_(earth),
+      state_(camera),
+      steps_(typical_steps(config.facts)),
+      scratch_(Eigen::VectorXd::Zero(state_.P().rows())) {}
 
 void Filter::initialise(const Mean& mean, const BaseVector& std) {
   state_.reset(mean, std.cwiseAbs2());
@@ -67,7 +81,7 @@ void Filter::predict(const ImuSample& imu, double dt, const inertial::ImuNoise& 
   Mean& x = state_.x;
   sums_.add(x.nav, x.corrected(imu.gyro, imu.accel, dt), noise.gyro, noise.accel);
   integrate(x, last_, motion_, earth_, imu, dt);
-  x.gnss_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.position_time);
+  for (int i = 0; i < 3; ++i) x.gnss_bias(i) *= inertial::gauss_markov_decay(dt, gnss_bias_.position_time(i));
   x.gnss_velocity_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.velocity_time);
   if (sums_.duration() >= config_.process.covariance_interval - 1e-9) flush();
 }
@@ -99,11 +113,14 @@ Filter::Diagonal Filter::diagonal(double T) const {
   if (time.imu_offset > 0.0) d.noise(kImuOffset) = clock;
   if (time.position_latency > 0.0 && v.time_offset_std > 0.0) d.noise(kPositionLatency) = clock;
   if (time.wheel_latency > 0.0 && v.time_offset_std > 0.0 && time.imu_offset == 0.0) d.noise(kWheelLatency) = clock;
-  const double position_decay = inertial::gauss_markov_decay(T, gnss_bias_.position_time);
   const double velocity_decay = inertial::gauss_markov_decay(T, gnss_bias_.velocity_time);
-  d.decay.segment<3>(kGnssBias).setConstant(position_decay);
+  for (int i = 0; i < 3; ++i) {
+    const double decay = inertial::gauss_markov_decay(T, gnss_bias_.position_time(i));
+    d.decay(kGnssBias + i) = decay;
+    d.noise(kGnssBias + i) =
+        (1.0 - square(decay)) * square(gnss_bias_.position_std(i)) + square(gnss_bias_.position_walk(i)) * T;
+  }
   d.decay.segment<3>(kGnssVelocityBias).setConstant(velocity_decay);
-  d.noise.segment<3>(kGnssBias) = (1.0 - square(position_decay)) * gnss_bias_.position_std.cwiseAbs2();
   d.noise.segment<3>(kGnssVelocityBias) = (1.0 - square(velocity_decay)) * gnss_bias_.velocity_std.cwiseAbs2();
   return d;
 }
@@ -121,7 +138,7 @@ void Filter::flush() {
     step.Q = (move * step.Q * move.transpose()).eval();
     state_.p_ref = state_.x.nav.position;
   }
-  steps_.move(state_, step.F, diagonal(T).decay);
+  steps_.move(state_, step.F, diagonal(T).decay, T);
   const int n = state_.size();
   Eigen::MatrixXd& P = state_.P();
   Eigen::Matrix<double, 9, Eigen::Dynamic, 0, 9, kMaxSize> rows(9, n);
@@ -143,21 +160,33 @@ void Filter::flush() {
 }
 
 template <int Rows>
-Eigen::Matrix<double, Rows, Rows> Filter::innovation_covariance(const Measurement<Rows>& m) const {
+Eigen::Matrix<double, Rows, kWithoutCamera> Filter::at_epoch(const Measurement<Rows>& m) const {
   Eigen::Matrix<double, Rows, kWithoutCamera> H = m.H;
+  const double T = sums_.duration();
+  if (T <= 0.0) return H;
+  H.template leftCols<9>().setZero();
+  H = H * diagonal(T).decay.asDiagonal();
+  H.template leftCols<kInertialSize>() += m.H.template leftCols<9>() * transition().F;
+  return H;
+}
+
+template <int Rows>
+Eigen::Matrix<double, Rows, Rows> Filter::innovation_covariance(const Measurement<Rows>& m) const {
+  const Eigen::Matrix<double, Rows, kWithoutCamera> H = at_epoch(m);
   Eigen::Matrix<double, Rows, Rows> S = m.R;
   if (const double T = sums_.duration(); T > 0.0) {  // as if the covariance had been moved
-    const inertial::ErrorTransition step = transition();
-    const Diagonal d = diagonal(T);
     const Eigen::Matrix<double, Rows, 9> moved = m.H.template leftCols<9>();
-    S += moved * step.Q * moved.transpose();
-    S += m.H * d.noise.asDiagonal() * m.H.transpose();
-    H.template leftCols<9>().setZero();
-    H = H * d.decay.asDiagonal();
-    H.template leftCols<kInertialSize>() += moved * step.F;
+    S += moved * transition().Q * moved.transpose();
+    S += m.H * diagonal(T).noise.asDiagonal() * m.H.transpose();
   }
   S += H * state_.P().template topLeftCorner<kWithoutCamera, kWithoutCamera>() * H.transpose();
   return 0.5 * (S + S.transpose());
+}
+
+template <int Rows>
+void Filter::reject(const Measurement<Rows>& m) {
+  const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
+  if (innovation.usable) steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened);
 }
 
 template <int Rows>
@@ -208,6 +237,7 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
 template <int Rows>
 AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
   const AidingRecord record = judge(source, t_us, m, gate);
+  if (record.status == AidingStatus::kGated) reject(m);
   if (record.status != AidingStatus::kAccepted) return record;
   flush();
   // Slow, a scale does not show, and the noise of speeds without a sign is rectified.
@@ -216,19 +246,22 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
   return record;
 }
 
-std::optional<StepDetector::Step> Filter::mend_step(double sigmas) {
-  const std::optional<StepDetector::Step> step = steps_.most_likely(sigmas);
-  if (!step) {
+std::optional<StepDetector::Step> Filter::mend_step(double sigmas, bool displaced) {
+  if (!steps_.take_fresh() || !steps_.most_likely(sigmas, displaced)) {
     steps_.advance(state_);
     return std::nullopt;
   }
   flush();
+  const std::optional<StepDetector::Step> step = steps_.most_likely(sigmas, displaced);
   const int n = state_.size();
-  const auto per_unit = state_.carried().col(step->column).head(n);
-  scratch_.head(n) = step->size * per_unit;
+  const auto per_unit = state_.carried().middleCols(step->column, step->size.size()).topRows(n);
+  scratch_.head(n) = per_unit * step->size;
   state_.retract(scratch_);
-  scratch_.head(n) = std::sqrt(step->variance) * per_unit;
-  for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += scratch_(j) * scratch_.head(n);
+  const StepDetector::Small root = step->cov.llt().matrixL();
+  for (int k = 0; k < root.cols(); ++k) {
+    scratch_.head(n) = per_unit * root.col(k);
+    for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += scratch_(j) * scratch_.head(n);
+  }
   steps_.begin(state_);
   return step;
 }
@@ -272,6 +305,7 @@ double Filter::heading_std() const { return std::sqrt(state_.P()(kAtt + 2, kAtt 
 
 #define ROADFIX_INSTANTIATE(ROWS)                                                              \
   template AidingRecord Filter::fuse(AidingSource, int64_t, const Measurement<ROWS>&, double); \
+  template void Filter::reject(const Measurement<ROWS>&);                                      \
   template AidingRecord Filter::judge(AidingSource, int64_t, const Measurement<ROWS>&, double) const;
 ROADFIX_INSTANTIATE(1)
 ROADFIX_INSTANTIATE(2)

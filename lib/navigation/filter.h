@@ -47,10 +47,15 @@ class Filter {
     considered_first_ = first;
     considered_size_ = size;
   }
+  /// A rejected measurement is evidence for steps, and nothing else.
+  template <int Rows>
+  void reject(const Measurement<Rows>& m);
   /// Stationary standard deviation (m or m/s, level axes) and correlation time of the receiver's Gauss-Markov errors.
   struct GnssBias {
     Eigen::Vector3d position_std = Eigen::Vector3d::Zero(), velocity_std = Eigen::Vector3d::Zero();
-    double position_time = 30.0, velocity_time = 2.0;  ///< s
+    Eigen::Vector3d position_time = Eigen::Vector3d::Constant(30.0);  ///< s
+    double velocity_time = 2.0;                                       ///< s
+    Eigen::Vector3d position_walk = Eigen::Vector3d::Zero();          ///< m/sqrt(s), beside it: of a displaced receiver
   };
   [[nodiscard]] GnssBias& gnss_bias() { return gnss_bias_; }
   [[nodiscard]] const GnssBias& gnss_bias() const { return gnss_bias_; }
@@ -63,7 +68,7 @@ class Filter {
   void watch_for_steps() { steps_.begin(state_); }
   [[nodiscard]] StepDetector& steps() { return steps_; }
   /// A step that explains the innovations better than chance does at this many sigmas is taken back.
-  std::optional<StepDetector::Step> mend_step(double sigmas);
+  std::optional<StepDetector::Step> mend_step(double sigmas, bool displaced);
 
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] State& state() { return state_; }
@@ -86,7 +91,7 @@ class Filter {
     last_.serialise(a);
     steps_.serialise(a);
     a(motion_.rate, motion_.acceleration, considered_first_, considered_size_, gnss_bias_.position_std,
-      gnss_bias_.velocity_std, gnss_bias_.position_time, gnss_bias_.velocity_time);
+      gnss_bias_.velocity_std, gnss_bias_.position_time, gnss_bias_.velocity_time, gnss_bias_.position_walk);
   }
   void digest(Digest& digest) const { state_.digest(digest); }
 
@@ -99,6 +104,9 @@ class Filter {
   [[nodiscard]] inertial::ErrorTransition transition() const;
   template <int Rows>
   [[nodiscard]] Eigen::Matrix<double, Rows, Rows> innovation_covariance(const Measurement<Rows>& m) const;
+  /// H against the errors at the covariance's epoch.
+  template <int Rows>
+  [[nodiscard]] Eigen::Matrix<double, Rows, kWithoutCamera> at_epoch(const Measurement<Rows>& m) const;
   template <int Rows>
   void apply(const Measurement<Rows>& m, bool evidence);
 

@@ -274,8 +274,14 @@ void Navigation::use_pictures(int64_t t_us) {
 
 /// A step that explains the innovations is taken back, (N.5.10).
 void Navigation::mend_steps() {
-  if (!config_.aiding.step_detection || !filter_->mend_step(config_.aiding.gate_sigma)) return;
-  ++steps_;
+  if (!config_.aiding.step_detection) return;
+  if (imu_noise_.frozen())
+    return filter_->steps().begin(filter_->state());  // what the filter is off by is no sensor's step
+  GnssPositionControl& gnss = aiding_.gnss_position();
+  const auto step = filter_->mend_step(config_.aiding.gate_sigma, gnss.displaced());
+  if (!step) return;
+  if (step->kind == StepKind::kWheels) ++steps_;
+  if (step->kind == StepKind::kReceiver) gnss.set_displaced(filter_->state().x.t_us);
   predictor_stale_ = true;
 }
 

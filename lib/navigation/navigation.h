@@ -37,7 +37,7 @@ struct NavigationStatus {
   int64_t bad_imu_samples = 0;
   bool imu_frozen = false;
   int64_t imu_gaps = 0;
-  int64_t wheel_scale_steps = 0;  ///< of wheels, receiver or gyro, that were detected and taken back
+  int64_t wheel_scale_steps = 0;  ///< that were detected and taken back
 };
 
 struct NavigationOutput {

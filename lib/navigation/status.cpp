@@ -9,6 +9,7 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr char kHeadingRoughly[] = "the heading is known roughly";
+constexpr char kDisplaced[] = "GNSS positions contradict all else and are taken for displaced";
 constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is taken for an error of the receiver";
 
 constexpr char kWaitsForRest[] = "rest, or a speed from the wheels";
@@ -58,7 +59,8 @@ NavigationOutput Navigation::output() {
     out.odometry.validity = coasting || alignment_.parked() ? Validity::kCoasting : Validity::kValid;
     if (coasting) out.reason = local() ? "coasting without wheels and tracks" : "coasting without GNSS";
     if (alignment_.parked()) out.reason = "from the place where it was parked, without GNSS yet";
-    if (aiding_.gnss_position().height_differs()) out.reason = kHeightContradicts;
+    if (aiding_.gnss_position().height_displaced()) out.reason = kHeightContradicts;
+    if (aiding_.gnss_position().displaced()) out.reason = kDisplaced;
     if (imu_noise_.frozen()) out.reason = "IMU readings do not change";
   }
   return out;
@@ -80,7 +82,8 @@ NavigationStatus Navigation::status() const {
   if (local() && phase_ != Phase::kDone) s.waits_for = kWaitsForRest;
   s.gnss_quality = screen_.quality();
   s.gnss_reason = screen_.reason();
-  if (s.gnss_reason.empty() && aiding_.gnss_position().height_differs()) s.gnss_reason = kHeightContradicts;
+  if (s.gnss_reason.empty() && aiding_.gnss_position().height_displaced()) s.gnss_reason = kHeightContradicts;
+  if (s.gnss_reason.empty() && aiding_.gnss_position().displaced()) s.gnss_reason = kDisplaced;
   s.bad_imu_samples = bad_imu_;
   s.imu_gaps = gaps_;
   s.wheel_scale_steps = steps_ + aiding_.wheel_speed().scale_steps();

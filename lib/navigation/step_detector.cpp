@@ -1,6 +1,7 @@
 #include "navigation/step_detector.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace roadfix::navigation {
 
@@ -8,21 +9,60 @@ namespace {
 
 constexpr int64_t kApart_us = 1'000'000;  // between two moments
 constexpr double kMostOfIt = 0.5;         // of what the innovations have too much, at least, is the step's
+constexpr double kLeastEvidence = 3.0;    // measurements; fewer are outliers
+constexpr double kBeyondOthers = 3.0;     // by which the logarithm of the odds exceeds that of every other kind
+
+struct Block {
+  StepKind kind;
+  int first, size;
+  double rarity;  ///< minus the logarithm of how often it steps, against the receiver (assumed)
+};
+constexpr std::array<Block, StepDetector::kKinds> kBlocks = {
+    Block{StepKind::kWheels, 0, 1, 2.0}, Block{StepKind::kImu, 1, 6, 2.0}, Block{StepKind::kReceiver, 7, 6, 0.0}};
+constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10;  // columns
+
+/// A step of normal prior given the evidence: mean, covariance, and the logarithm of the Bayes factor.
+struct Posterior {
+  using Square = StepDetector::Small;
+  using Vector = StepDetector::SmallVector;
+  Square cov;
+  Vector mean;
+  double explained = 0.0, log_odds = 0.0;
+
+  Posterior(const Square& information, const Vector& sum, const Vector& typical) {
+    Square A = typical.asDiagonal() * information * typical.asDiagonal();
+    A.diagonal().array() += 1.0;
+    const Eigen::LLT<Square> llt(A);
+    const Square inverse = llt.solve(Square::Identity(sum.size(), sum.size()));
+    cov = typical.asDiagonal() * inverse * typical.asDiagonal();
+    mean = cov * sum;
+    explained = mean.dot(sum);
+    log_odds = 0.5 * explained - llt.matrixLLT().diagonal().array().log().sum();
+  }
+};
 
 }  // namespace
 
 void StepDetector::begin(State& state) {
   if (state.carried().cols() != kColumns) state.carry(kColumns);
-  for (int k = 0; k < kColumns; ++k) begin(state, k);
+  for (int m = 0; m < kMoments; ++m) begin(state, m);
   next_us_ = 0;
   usual_ = 1.0;
+  fresh_ = false;
   watches_ = true;
 }
 
-void StepDetector::begin(State& state, int column) {
-  state.carried().col(column).setZero();
-  state.carried()(kSteps[static_cast<size_t>(column / kMoments)], column) = 1.0;
-  information_(column) = sum_(column) = squares_(column) = 0.0;
+void StepDetector::begin(State& state, int moment) {
+  auto columns = state.carried().middleCols(first(moment), width(moment));
+  columns.setZero();
+  columns(kWheelScale, 0) = 1.0;
+  if (moment < kRecent) {
+    columns.block<6, 6>(kGyroBias, kBiases).setIdentity();
+    columns.block<3, 3>(kGnssBias, kDisplacement).setIdentity();
+  }
+  information_[static_cast<size_t>(moment)].setZero();
+  sum_.col(moment).setZero();
+  age_(moment) = squares_(moment) = count_(moment) = 0.0;
 }
 
 /// Two moments per octave: of one second the first two take turns, of two seconds the next two, ...
@@ -34,31 +74,85 @@ void StepDetector::advance(State& state) {
   for (int octave = 0; octave < kMoments / 2; ++octave) {
     const int period = 1 << octave;
     if (turn_ % period != 0) break;
-    for (int h = 0; h < kHypotheses; ++h) begin(state, h * kMoments + 2 * octave + (turn_ / period) % 2);
+    begin(state, 2 * octave + (turn_ / period) % 2);
   }
 }
 
 void StepDetector::move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
-                        const Eigen::Matrix<double, kWithoutCamera, 1>& decay) {
+                        const Eigen::Matrix<double, kWithoutCamera, 1>& decay, double T) {
   if (!watches_) return;
   Eigen::MatrixXd& errors = state.carried();
-  const Eigen::Matrix<double, 9, kColumns> moved = F.lazyProduct(errors.topRows<kInertialSize>());
+  moved_.noalias() = Eigen::Ref<const Eigen::MatrixXd>(F).lazyProduct(errors.topRows(kInertialSize));
   for (int i = kGnssBias; i < kWithoutCamera; ++i) errors.row(i) *= decay(i);
-  errors.topRows<9>() = moved;
+  errors.topRows(9) = moved_;
+  for (int m = 0; m < kRecent; ++m)  // a displacement does not decay with the receiver's other errors, (N.5.9)
+    for (int i = 0; i < 3; ++i) {
+      const double d = decay(kGnssBias + i);
+      errors(kGnssBias + i, first(m) + kDisplacement + i) += 1.0 - d;
+      errors(kGnssBias + i, first(m) + kDrag + i) += age_(m) + T - d * age_(m);
+    }
+  age_.array() += T;
 }
 
-std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas) const {
-  if (!watches_) return std::nullopt;
-  std::optional<Step> best;
-  double most = sigmas * sigmas * std::max(1.0, usual_);
-  for (int k = 0; k < kColumns; ++k) {
-    if (!(information_(k) > 0.0)) continue;
-    const double explained = sum_(k) * sum_(k) / information_(k);
-    if (explained < most || explained < kMostOfIt * squares_(k)) continue;
-    most = explained;
-    best = Step{kSteps[static_cast<size_t>(k / kMoments)], sum_(k) / information_(k), 1.0 / information_(k), k};
+StepDetector::Rows StepDetector::explained(const State& state, const Eigen::Ref<const Eigen::MatrixXd>& H,
+                                           const Eigen::Ref<const Eigen::MatrixXd>& L) {
+  auto G = explained_.topRows(H.rows());
+  G.noalias() = H.lazyProduct(state.carried().topRows(kWithoutCamera));
+  for (int i = 0; i < L.rows(); ++i) {
+    for (int k = 0; k < i; ++k) G.row(i) -= L(i, k) * G.row(k);
+    G.row(i) /= L(i, i);
+  }
+  return G;
+}
+
+void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G,
+                         const Eigen::Ref<const Eigen::VectorXd>& whitened) {
+  // Robust weight, as of Huber's estimator: single outliers decide nothing, those that agree with each other do.
+  const double square = whitened.squaredNorm(), rows = static_cast<double>(whitened.size());
+  const double weight = std::min(1.0, kMostSquare * rows / square);
+  for (int m = 0; m < kMoments; ++m) {
+    const int n = width(m);
+    const auto g = G.middleCols(first(m), n);
+    information_[static_cast<size_t>(m)].topLeftCorner(n, n) += weight * g.transpose().lazyProduct(g);
+    sum_.col(m).head(n) += weight * g.transpose().lazyProduct(whitened);
+    squares_(m) += weight * square - rows;
+    count_(m) += 1.0;
+  }
+  fresh_ = true;
+}
+
+StepDetector::Fit StepDetector::best_of(int at, int size) const {
+  const double usual = std::max(1.0, usual_);
+  Fit best;
+  for (int m = 0; m < kMoments; ++m) {
+    if (count_(m) < kLeastEvidence || at + size > width(m)) continue;
+    const Posterior fit(information_[static_cast<size_t>(m)].block(at, at, size, size) / usual,
+                        sum_.col(m).segment(at, size) / usual, typical_.segment(at, size));
+    if (fit.explained * usual < kMostOfIt * squares_(m)) continue;
+    if (fit.log_odds > best.log_odds) best = {m, fit.log_odds};
   }
   return best;
+}
+
+std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool displaced) const {
+  if (!watches_) return std::nullopt;
+  std::array<Fit, kKinds> fits;
+  size_t best = 0;
+  for (size_t k = 0; k < kKinds; ++k) {
+    if (displaced && kBlocks[k].kind == StepKind::kReceiver) continue;
+    fits[k] = best_of(kBlocks[k].first, kBlocks[k].size);
+    fits[k].log_odds -= kBlocks[k].rarity;
+    if (fits[k].log_odds > fits[best].log_odds) best = k;
+  }
+  if (fits[best].log_odds < 0.5 * sigmas * sigmas) return std::nullopt;
+  for (size_t k = 0; k < kKinds; ++k)
+    if (k != best && fits[best].log_odds < fits[k].log_odds + kBeyondOthers) return std::nullopt;
+  const auto [kind, at, size, rarity] = kBlocks[best];
+  const int m = fits[best].moment;
+  const double usual = std::max(1.0, usual_);
+  const Posterior fit(information_[static_cast<size_t>(m)].block(at, at, size, size) / usual,
+                      sum_.col(m).segment(at, size) / usual, typical_.segment(at, size));
+  return Step{kind, fit.log_odds - rarity, first(m) + at, fit.mean, fit.cov};
 }
 
 }  // namespace roadfix::navigation

@@ -1,6 +1,6 @@
-/// Has something jumped, and when? Generalised likelihood ratio test (Willsky and Jones 1976) over a list of states that
-/// may step: for some moments it carries what a step of one unit then would have made of the filter's errors since, and
-/// how well that explains the innovations, (N.5.8) to (N.5.10) of MODEL.md.
+/// Has something jumped, what, and when? Generalised likelihood ratio test (Willsky and Jones 1976) over a list of
+/// things that may step: for some moments it carries what a step of one unit then would have made of the filter's errors
+/// since, and how well that explains the innovations, of rejected measurements too, (N.5.8) to (N.5.10) of MODEL.md.
 ///
 /// What a step would have made of the errors are the columns that the state carries (State::carried()), so poses of the
 /// camera have their rows too.
@@ -8,74 +8,114 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "navigation/state.h"
 
 namespace roadfix::navigation {
 
+enum class StepKind {
+  kWheels,    ///< their scale
+  kImu,       ///< gyro and accelerometer biases
+  kReceiver,  ///< its position is displaced, and may be dragged on from there
+};
+
 class StepDetector {
  public:
-  static constexpr int kHypotheses = 1;
-  /// The wheels' scale. A state is added by its index here.
-  static constexpr std::array<int, kHypotheses> kSteps = {kWheelScale};
-  static constexpr int kMoments = 8;
-  static constexpr int kColumns = kHypotheses * kMoments;
+  static constexpr int kKinds = 3, kMoments = 8;
+  /// Of these moments all kinds are carried, of the older ones the wheels' scale alone.
+  static constexpr int kRecent = 4;
+  /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate.
+  static constexpr int kWidth = 13;
+  static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent;
+  static constexpr int width(int moment) { return moment < kRecent ? kWidth : 1; }
+  static constexpr int first(int moment) {
+    return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
+  }
+  using Sizes = Eigen::Matrix<double, kWidth, 1>;
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+  using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
   struct Step {
-    int state = 0;                      ///< which stepped
-    double size = 0.0, variance = 0.0;  ///< in the state's unit
-    int column = 0;                     ///< carried column: errors of the filter now per unit of the step
+    StepKind kind = StepKind::kWheels;
+    double log_odds = 0.0;  ///< against none
+    int column = 0;         ///< first of the carried columns: errors of the filter now per unit of the step
+    SmallVector size;       ///< in the units of the columns
+    Small cov;
   };
+
+  /// `typical`: standard deviations of steps, in the order of the columns.
+  explicit StepDetector(const Sizes& typical) : typical_(typical) {}
 
   /// Watches from now on.
   void begin(State& state);
   void stop() { watches_ = false; }
   [[nodiscard]] bool watches() const { return watches_; }
-  /// At t_us, often: the oldest of the recent moments are replaced by now.
+  /// Often: the oldest of the recent moments are replaced by now.
   void advance(State& state);
 
-  /// The filter's covariance step.
+  /// The filter's covariance step over T s.
   void move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
-            const Eigen::Matrix<double, kWithoutCamera, 1>& decay);
+            const Eigen::Matrix<double, kWithoutCamera, 1>& decay, double T);
   /// The filter's update: `whitened` innovation u = L^-1 r, Y = P H' L^-T; `counts`: it is evidence.
   template <int Rows>
   void use(State& state, const Eigen::Matrix<double, Rows, kWithoutCamera>& H,
            const Eigen::Matrix<double, Rows, Rows>& L, const Eigen::Matrix<double, Rows, 1>& whitened,
            const Eigen::Ref<const Eigen::MatrixXd>& Y, bool counts) {
     if (!watches_) return;
-    auto errors = state.carried().topRows(state.size());
-    Eigen::Matrix<double, Rows, kColumns> G = H.lazyProduct(errors.template topRows<kWithoutCamera>());
-    L.template triangularView<Eigen::Lower>().solveInPlace(G);
-    errors.noalias() -= Y.lazyProduct(G);
+    auto G = explained(state, H, L);
+    state.carried().topRows(state.size()).noalias() -= Y.lazyProduct(G);
     if (!counts) return;
-    const double squares = whitened.squaredNorm();
-    usual_ += kUsualGain * (std::min(squares / Rows, kMostSquare) - usual_);
-    for (int k = 0; k < kColumns; ++k) {
-      information_(k) += G.col(k).squaredNorm();
-      sum_(k) += G.col(k).dot(whitened);
-      squares_(k) += squares - Rows;
-    }
+    usual_ += kUsualGain * (std::min(whitened.squaredNorm() / Rows, kMostSquare) - usual_);
+    weigh(G, whitened);
+  }
+  /// A measurement that the filter rejected.
+  template <int Rows>
+  void reject(const State& state, const Eigen::Matrix<double, Rows, kWithoutCamera>& H,
+              const Eigen::Matrix<double, Rows, Rows>& L, const Eigen::Matrix<double, Rows, 1>& whitened) {
+    if (watches_) weigh(explained(state, H, L), whitened);
   }
 
-  /// The step that explains most, unless chance does at this many sigmas, or something else makes the innovations large.
-  [[nodiscard]] std::optional<Step> most_likely(double sigmas) const;
+  /// The step that explains most, unless chance does at this many sigmas, something else makes the innovations large, or
+  /// another kind explains as much. `displaced`: the receiver is known to be, and its steps are the filter's to follow.
+  [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced) const;
+  /// Evidence has come since the last call.
+  [[nodiscard]] bool take_fresh() { return std::exchange(fresh_, false); }
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(watches_, next_us_, turn_, usual_, information_, sum_, squares_);
+    a(watches_, fresh_, next_us_, turn_, usual_, age_, sum_, squares_, count_);
+    for (auto& m : information_) a(m);
   }
 
  private:
   static constexpr double kUsualGain = 0.01;  // ten seconds of wheel speeds
   static constexpr double kMostSquare = 9.0;  // one innovation counts at most as three sigma
-  void begin(State& state, int column);
+  using Square = Eigen::Matrix<double, kWidth, kWidth>;
+  /// What of a whitened innovation each step makes; in place, so that nothing of a fixed size is unrolled.
+  using Rows = Eigen::Block<Eigen::MatrixXd>;
+  Rows explained(const State& state, const Eigen::Ref<const Eigen::MatrixXd>& H,
+                 const Eigen::Ref<const Eigen::MatrixXd>& L);
+  void weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen::Ref<const Eigen::VectorXd>& whitened);
+  struct Fit {
+    int moment = 0;
+    double log_odds = 0.0;
+  };
+  void begin(State& state, int moment);
+  [[nodiscard]] Fit best_of(int at, int size) const;
 
-  bool watches_ = false;
+  Sizes typical_;
+  Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
+  bool watches_ = false, fresh_ = false;
   int64_t next_us_ = 0;
   int turn_ = 0;
   double usual_ = 1.0;  ///< mean normalised square: measurements may be noisier than they claim
-  using PerColumn = Eigen::Matrix<double, kColumns, 1>;
-  PerColumn information_ = PerColumn::Zero(), sum_ = PerColumn::Zero(), squares_ = PerColumn::Zero();
+  std::array<Square, kMoments> information_{Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero(),
+                                            Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero()};
+  Eigen::Matrix<double, kWidth, kMoments> sum_ = Eigen::Matrix<double, kWidth, kMoments>::Zero();
+  /// By moment: s since; of the innovations beyond their number; evidence.
+  using ByMoment = Eigen::Matrix<double, kMoments, 1>;
+  ByMoment age_ = ByMoment::Zero(), squares_ = ByMoment::Zero(), count_ = ByMoment::Zero();
 };
 
 }  // namespace roadfix::navigation

@@ -9,7 +9,8 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kOutage = 3.0;  // s without a position, after which its errors are new
+constexpr double kOutage = 3.0;    // s without a position, after which its errors are new
+constexpr double kForEver = 1e12;  // s
 constexpr double kErrorTime =
     20.0;  // s: multipath and code smoothing last seconds to a minute (Misra and Enge 2006, ch. 5)
 // Share of a fix's variance that lasts, before innovations have shown it, and its bounds.
@@ -21,8 +22,13 @@ constexpr double kMostProduct = 4.0;  // of two whitened innovations: outliers c
 // typically is.
 constexpr double kReturnLevel = 3.0, kReturnUp = 6.0;
 constexpr double kDisplacement = 5.0;
-constexpr double kDisplacedPrior = 0.01;               // of a run of rejected fixes
-constexpr double kTailFreedom = 3.0;                   // Student's t: errors of filters and receivers have heavy tails
+constexpr double kDisplacedPrior = 0.01;    // of a run of rejected fixes
+constexpr double kDisplacedWalk = 0.5;      // m/sqrt(s), of a displacement
+constexpr double kLongestDisplaced = 60.0;  // s: for longer a receiver is seldom displaced, and the filter is wrong
+constexpr double kBack = 7.0;               // logarithm of the odds (1000 to 1) that it is no longer displaced
+constexpr double kBackSigmas = 3.0;         // of its usual error, within which a displaced height is back
+constexpr double kTooLong = 5.0;            // s of rejected fixes that agree, without a step that explains them
+constexpr double kTailFreedom = 3.0;        // Student's t: errors of filters and receivers have heavy tails
 constexpr int kRunForFilter = 2, kRunForReceiver = 3;  // rejected fixes that agree, to decide
 constexpr double kAlikeShare = 0.2;                    // of their size, by which fixes of a run may differ
 
@@ -70,9 +76,13 @@ Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queu
   return m;
 }
 
-void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
+void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) const {
   filter.gnss_bias().position_std = bias.stationary_std;
-  filter.gnss_bias().position_time = kErrorTime;
+  for (int i = 0; i < 3; ++i) {
+    const bool off = displaced() || (i == 2 && height_displaced_);
+    filter.gnss_bias().position_time(i) = off ? kForEver : kErrorTime;
+    filter.gnss_bias().position_walk(i) = off ? kDisplacedWalk : 0.0;
+  }
   if (bias.anew) filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
 }
 
@@ -86,12 +96,21 @@ AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) cons
 AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   Bias bias = bias_of(fix);
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
+  if (displaced() && r.status != AidingStatus::kBadInput) {
+    if (is_back(filter, fix, bias, r.log_likelihood)) {
+      bias.anew = true;
+      bias.std = bias.stationary_std;
+      r.status = AidingStatus::kAccepted;
+    } else if (seconds_between(displaced_since_us_, fix.t_us) > kLongestDisplaced) {
+      r = believe(filter, fix, bias);
+    }
+  }
   if (r.status == AidingStatus::kAccepted) {
     set_bias(filter, bias);
     bias.anew = false;
     (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
-    learn(fix, r);
-    height_differs_ = false;
+    if (!displaced()) learn(fix, r);
+    if (std::abs(filter.state().x.gnss_bias.z()) < kBackSigmas * bias.stationary_std.z()) height_displaced_ = false;
   } else if (r.status == AidingStatus::kGated) {
     const AidingRecord level = use_level(filter, fix, bias);
     r = level.status == AidingStatus::kAccepted ? level : decide(filter, fix, bias, r);
@@ -101,6 +120,39 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
     used_at_us_ = fix.t_us;
     rejected_ = 0;
   }
+  return r;
+}
+
+/// A displaced receiver that comes back, (N.5.6): cumulative sum of the log-likelihood ratios of fixes.
+bool GnssPositionControl::is_back(Filter& filter, const Queued& fix, const Bias& bias, double log_likelihood) {
+  Bias none = bias;
+  none.anew = true;
+  none.std = none.stationary_std;
+  const AidingRecord r =
+      filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), gates_.nis[3]);
+  if (r.status != AidingStatus::kAccepted) {
+    back_ = 0.0;
+    return false;
+  }
+  back_ = std::max(0.0, back_ + r.log_likelihood - log_likelihood);
+  if (back_ < kBack) return false;
+  displaced_since_us_ = 0;
+  return true;
+}
+
+/// What was taken for a displacement is the filter's error.
+AidingRecord GnssPositionControl::believe(Filter& filter, const Queued& fix, const Bias& bias) {
+  const Eigen::Vector3d off = filter.state().x.gnss_bias;
+  displaced_since_us_ = 0;
+  Bias none = bias;
+  none.anew = true;
+  none.std = none.stationary_std;
+  set_bias(filter, none);
+  none.anew = false;
+  widen_filter(filter, fix, off);
+  AidingRecord r =
+      filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), Gates::open().nis[3]);
+  r.status = AidingStatus::kReset;
   return r;
 }
 
@@ -128,49 +180,38 @@ AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix, c
   const AidingRecord r =
       filter.judge(AidingSource::kGnssPosition, fix.t_us, level_of(measurement(filter, fix, bias)), gates_.nis[2]);
   if (r.status != AidingStatus::kAccepted) return r;
+  height_displaced_ = true;
   set_bias(filter, bias);
   Bias now = bias;
   now.anew = false;
   const Measurement<3> all = measurement(filter, fix, now);
   (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, level_of(all), Gates::open().nis[2]);
-  height_differs_ = true;
   BaseVector wider = BaseVector::Zero();
   wider(kGnssBias + 2) = all.residual(2);
   filter.widen(wider);
   return r;
 }
 
-/// A displaced receiver that comes back: what b holds is over.
-AidingRecord GnssPositionControl::take_undisplaced(Filter& filter, const Queued& fix, const Bias& bias) {
-  Bias none = bias;
-  none.anew = true;
-  none.std = none.stationary_std;
-  AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), gates_.nis[3]);
-  if (r.status != AidingStatus::kAccepted) return r;
-  set_bias(filter, none);
-  none.anew = false;
-  displaced_ = false;
-  return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), Gates::open().nis[3]);
-}
-
-/// (N.5.5): an outlier, a displaced receiver or a wrong filter?
+/// (N.5.5): an outlier, a displaced receiver or a wrong filter? Between two fixes of a second a filter does not jump; after
+/// an outage either may be off, and sizes decide. What grows while fixes come is the step detector's.
 AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, const Bias& bias,
                                          const AidingRecord& rejected) {
   AidingRecord r = rejected;
-  if (displaced_) {
-    const AidingRecord back = take_undisplaced(filter, fix, bias);
-    if (back.status == AidingStatus::kAccepted) return back;
-  }
   const Measurement<3> m = measurement(filter, fix, bias);
+  filter.reject(m);
   const Eigen::Vector3d off = m.residual;
   const double noise = std::sqrt(2.0 * gates_.nis[2] * (m.R(0, 0) + m.R(1, 1)));
   const double apart = (off - first_off_).head<2>().norm();
   if (rejected_ == 0 || apart > noise + kAlikeShare * off.head<2>().norm()) {
+    if (rejected_ > 0) receivers_[static_cast<size_t>(fix.fix_type)].scale.learn(r);
+    if (rejected_ == 0) rejected_since_us_ = fix.t_us;
     rejected_ = 1;
     first_off_ = off;
     return r;
   }
   ++rejected_;
+  const bool after_outage = seconds_between(used_at_us_, rejected_since_us_) > kOutage;
+  if (!after_outage && seconds_between(rejected_since_us_, fix.t_us) < kTooLong) return r;
   const Eigen::Matrix2d S =
       Eigen::Vector2d(rejected.innovation_variance[0], rejected.innovation_variance[1]).asDiagonal();
   const double wrong_filter = log_tail(off.head<2>(), S);
@@ -178,10 +219,10 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
                            log_tail(off.head<2>(), kDisplacement * kDisplacement * Eigen::Matrix2d::Identity() + S);
   const bool filter_is_wrong = wrong_filter >= displaced;
   if (rejected_ < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
+  if (!filter_is_wrong) set_displaced(fix.t_us);
   set_bias(filter, bias);
   Bias now = bias;
   now.anew = false;
-  displaced_ = !filter_is_wrong;
   if (filter_is_wrong) {
     widen_filter(filter, fix, off);
   } else {

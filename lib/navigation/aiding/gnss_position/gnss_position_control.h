@@ -24,14 +24,20 @@ class GnssPositionControl {
   AidingRecord try_on(Filter& filter, const Queued& fix) const;
   /// A fix was tried on the hypotheses of a start.
   void tried(const Queued& fix) {
-    tried_at_us_ = fix.t_us;
+    tried_at_us_ = used_at_us_ = fix.t_us;
     last_type_ = fix.fix_type;
   }
   /// m, of the Gauss-Markov error in a fix, level axes.
   [[nodiscard]] Eigen::Vector3d lasting_std(const GnssFix& fix) const;
 
-  [[nodiscard]] bool displaced() const { return displaced_; }
-  [[nodiscard]] bool height_differs() const { return height_differs_; }
+  /// The step detector found that the receiver is displaced.
+  void set_displaced(int64_t t_us) {
+    displaced_since_us_ = t_us;
+    back_ = 0.0;
+  }
+  [[nodiscard]] bool displaced() const { return displaced_since_us_ != 0; }
+  /// The height alone is displaced.
+  [[nodiscard]] bool height_displaced() const { return height_displaced_; }
   /// The filter has lost its past (a gap, a new start): nothing holds against the receiver.
   void clear_run() { rejected_ = 0; }
 
@@ -41,7 +47,8 @@ class GnssPositionControl {
       r.scale.serialise(a);
       a(r.lasting_share, r.last_whitened);
     }
-    a(used_at_us_, tried_at_us_, last_type_, rejected_, first_off_, displaced_, height_differs_);
+    a(used_at_us_, tried_at_us_, last_type_, rejected_, rejected_since_us_, displaced_since_us_, back_, first_off_,
+      height_displaced_);
   }
 
  private:
@@ -60,10 +67,11 @@ class GnssPositionControl {
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
-  static void set_bias(Filter& filter, const Bias& bias);
+  void set_bias(Filter& filter, const Bias& bias) const;
   AidingRecord use_level(Filter& filter, const Queued& fix, const Bias& bias);
   AidingRecord decide(Filter& filter, const Queued& fix, const Bias& bias, const AidingRecord& rejected);
-  AidingRecord take_undisplaced(Filter& filter, const Queued& fix, const Bias& bias);
+  bool is_back(Filter& filter, const Queued& fix, const Bias& bias, double log_likelihood);
+  AidingRecord believe(Filter& filter, const Queued& fix, const Bias& bias);
   void widen_filter(Filter& filter, const Queued& fix, const Eigen::Vector3d& off) const;
   void learn(const Queued& fix, const AidingRecord& r);
 
@@ -72,9 +80,11 @@ class GnssPositionControl {
   std::array<Receiver, 6> receivers_;  // by FixType
   int64_t used_at_us_ = 0, tried_at_us_ = 0;
   FixType last_type_ = FixType::kNone;
-  int rejected_ = 0;                                     // in a row, that agree with each other
+  int rejected_ = 0;  // in a row, that agree with each other
+  int64_t rejected_since_us_ = 0, displaced_since_us_ = 0;
+  double back_ = 0.0;                                    // logarithm of the odds that it is no longer displaced
   Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();  // innovation of the first of them
-  bool displaced_ = false, height_differs_ = false;
+  bool height_displaced_ = false;
 };
 
 }  // namespace roadfix::navigation

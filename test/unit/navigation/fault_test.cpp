@@ -1,0 +1,122 @@
+// Lies and failures that a filter must survive, by the simulator's faults.
+#include <catch2/catch.hpp>
+#include <cstdio>
+
+#include "filter_run.h"
+
+using namespace roadfix;
+using namespace roadfix::navtest;
+
+namespace {
+
+struct Worst {
+  double horizontal = 0.0;  ///< m, over all outputs that do not call themselves invalid, after 30 s
+  double beyond = 0.0;      ///< the largest error in its own sigmas, of outputs that call themselves valid
+  double last = 1e9;        ///< m, at the end
+  int resets = 0;
+  bool valid_at_end = false;
+};
+
+Worst drive_with(const char* fault, double duration_s, uint64_t seed, const char* second = nullptr,
+                 bool scale_steps = true) {
+  ScenarioConfig s = scenario("city_loop");
+  s.duration_s = duration_s;
+  for (const char* f : {fault, second})
+    if (f != nullptr) s.faults.push_back(parse_fault(f));
+  const SimulatedDrive drive = simulate(s, seed);
+  NavigationConfig config = filter_config(s);
+  config.aiding.step_detection = scale_steps;
+  Navigation filter(config);
+  Worst worst;
+  const int64_t start = drive.imu.front().t_us;
+  int64_t next = start + 30'000'000;
+  run(filter, Samples(drive), [&](Navigation& f, int64_t now) {
+    f.clear_records();
+    if (now < next) return;
+    next += 100'000;
+    const NavigationOutput o = f.output();
+    worst.resets = o.reset_counter;
+    worst.valid_at_end = o.odometry.validity == Validity::kValid;
+    if (o.odometry.validity == Validity::kInvalid) return;
+    const double e = error_of(f, o.odometry, drive).head<2>().norm();
+    const double sigma = std::sqrt(o.odometry.cov_pose(0, 0) + o.odometry.cov_pose(1, 1));
+    worst.last = e;
+    worst.horizontal = std::max(worst.horizontal, e);
+    if (o.odometry.validity == Validity::kValid) worst.beyond = std::max(worst.beyond, e / sigma);
+  });
+  return worst;
+}
+
+/// The filter was never further off than `most`, no more than `last` (m) at the end, and never gave itself up.
+void check_held(const Worst& w, double most, double last) {
+  CAPTURE(w.horizontal, w.beyond, w.last, w.resets);
+  CHECK(w.horizontal < most);
+  CHECK(w.last < last);
+  CHECK(w.resets == 0);
+}
+
+}  // namespace
+
+TEST_CASE("fixes 15 m off for half a minute are not followed") {
+  check_held(drive_with("gnss.bias@60+30:east_m=15", 120.0, 2), 1.5, 0.2);
+}
+
+TEST_CASE("a receiver that stays 15 m off is believed in the end") {
+  const Worst w = drive_with("gnss.bias@60+200:east_m=15", 180.0, 2);
+  CHECK(w.resets >= 1);
+  CHECK(w.last > 10.0);
+}
+
+TEST_CASE("a gyro that clips in turns does not leave a lost filter that calls itself valid") {
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    const Worst w = drive_with("imu.saturation@40+40:gyro_radps=0.2,accel_mps2=12", 150.0, seed);
+    CAPTURE(seed, w.horizontal, w.beyond, w.last);
+    CHECK(w.valid_at_end);
+    CHECK(w.last < 0.3);
+    CHECK(w.horizontal < 30.0);
+  }
+}
+
+TEST_CASE("a receiver that is dragged off at half a metre a second is held against") {
+  check_held(drive_with("gnss.ramp@80+40:east_mps=0.5", 150.0, 2), 1.5, 0.2);
+  // What cannot be told: a drag that lasts is believed in the end, with a reset that says so.
+  const Worst followed = drive_with("gnss.ramp@80+100:east_mps=0.5", 180.0, 2);
+  CHECK(followed.resets >= 1);
+  CHECK(followed.horizontal > 10.0);
+}
+
+namespace {
+
+constexpr const char* kShock =
+    "imu.bias@60+200:gyro_x_radps=0.002,gyro_y_radps=0.002,gyro_z_radps=0.002,"
+    "accel_x_mps2=0.1,accel_y_mps2=0.1,accel_z_mps2=0.1";
+
+}  // namespace
+
+TEST_CASE("an IMU whose biases step is doubted, and not the fixes that show it") {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    CAPTURE(seed);
+    check_held(drive_with(kShock, 120.0, seed), 0.5, 0.05);
+    check_held(drive_with(kShock, 120.0, seed, "wheels.silence@0+200"), 0.5, 0.05);
+  }
+  // Positions alone tell it as well. Teeth: not without the step detector.
+  check_held(drive_with(kShock, 120.0, 1, "gnss.no_velocity@0+200"), 0.5, 0.05);
+  CHECK(drive_with(kShock, 120.0, 1, nullptr, false).resets >= 1);
+}
+
+TEST_CASE("wheels that slip by less than their gate do not lead away from fixed fixes") {
+  for (const double ratio : {0.005, 0.01, 0.02, 0.03}) {
+    char fault[64];
+    (void)std::snprintf(fault, sizeof fault, "wheels.slip@40+50:ratio=%g", ratio);
+    const Worst w = drive_with(fault, 120.0, 1);
+    CAPTURE(ratio);
+    check_held(w, 0.1, 0.05);
+  }
+  // Positions alone tell it as well. Teeth: not where the scale is believed.
+  check_held(drive_with("wheels.slip@40+50:ratio=0.02", 120.0, 1, "gnss.no_velocity@0+120"), 0.1, 0.05);
+  CHECK(drive_with("wheels.slip@40+50:ratio=0.02", 120.0, 1, "gnss.no_velocity@0+120", false).horizontal > 1.0);
+}
+
+TEST_CASE("a receiver that repeats itself does not make wheels doubted") {
+  check_held(drive_with("gnss.stuck@60+20", 120.0, 1), 1.0, 0.08);
+}
