@@ -1,4 +1,5 @@
 """One command line: what every subcommand of roadfix shares. Arguments: repository, roadfix program."""
+import functools
 import os
 import pty
 import re
@@ -33,6 +34,62 @@ def subcommands(*before):
         return [before]
     names = re.findall(r"^  ([a-z][a-z_-]*)", text.split("Subcommands:")[1], re.MULTILINE)
     return [words for name in names for words in subcommands(*before, name)]
+
+
+def printed_commands(text):
+    """What a page tells to type: lines of programs of ours in indented blocks and in backticks, as lists of words without comments."""
+    lines = re.findall(r"(?m)^    (.*)$", text) + re.findall(r"`([^`\n]+)`", text)
+    for line in lines:
+        for part in re.split(r"&&|;", line.split("  #")[0].split(" # ")[0]):
+            words = part.split()
+            if words[:1] == ["sudo"]:
+                words = words[1:]
+            if words and words[0].startswith("build/release/bin/"):
+                yield [words[0].removeprefix("build/release/bin/"), *words[1:]]
+            elif words and words[0] == "roadfix":
+                yield words
+
+
+@functools.cache
+def help_of(*words):
+    done = subprocess.run([BIN / words[0], *words[1:], "--help"], capture_output=True, text=True, check=False, timeout=120)
+    return done.stdout if done.returncode == 0 else None
+
+
+def wrong_in(words):
+    """What of a printed command there is not: the program, the subcommand or an option."""
+    program, *rest = words
+    if not (BIN / program).exists():
+        return f"{program} is no program"
+    before = []
+    while True:
+        text = help_of(program, *before)
+        below = re.findall(r"(?m)^  ([a-z][a-z_-]*)", text.split("Subcommands:")[1]) if "Subcommands:" in text else []
+        if not below or not rest or not re.fullmatch(r"[a-z][a-z_-]*", rest[0]):
+            break
+        if rest[0] not in below and help_of(program, *before, rest[0]) is None:  # some are called by our own programs and not listed
+            return f"{program} {' '.join(before)}: there is no {rest[0]}"
+        before.append(rest.pop(0))
+    for option in re.findall(r"(?:^|[\s\[])(--?[a-z][a-z0-9-]*)", " ".join(rest)):
+        if not re.search(rf"(?<![\w-]){re.escape(option)}(?![\w-])", text):
+            return f"{program} {' '.join(before)}: there is no {option}"
+    return None
+
+
+class Pages(unittest.TestCase):
+    def test_what_pages_tell_to_type_is_there(self):
+        pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "configs/README.md", ROOT / "processes/roadfix/simulate/README.md",
+                 *sorted((ROOT / "docs").glob("*.md"))]
+        commands = {(page.name, *words) for page in pages for words in printed_commands(page.read_text())}
+        self.assertGreater(len(commands), 20)
+        for page, *words in sorted(commands):
+            with self.subTest(page, command=" ".join(words)):
+                self.assertIsNone(wrong_in(words))
+
+    def test_what_is_not_there_is_found(self):
+        page = "    build/release/bin/roadfix replay in.lcm --no-such-flag  # comment\n`roadfix no_such_command x` `build/release/bin/no_such_program`\n"
+        self.assertEqual([wrong_in(words) for words in printed_commands(page)],
+                         ["roadfix replay: there is no --no-such-flag", "roadfix : there is no no_such_command", "no_such_program is no program"])
 
 
 class Tool(unittest.TestCase):
