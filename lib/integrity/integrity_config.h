@@ -35,6 +35,7 @@ struct IntegrityConfig {
   ErrorScaleConfig tails;
   WitnessConfig witness;
   double correlated_share = 0.5;  ///< of the sigma of a fix: what does not average out, once it is verified
+  double timing_std = 0.01;       ///< s, of the sensors' stamps against each other
   double fault_prior = 0.002;     ///< probability that a source has failed within `short_lag` and nothing shows it
   double look_back = 10.0;        ///< s: a fault that is detected now may have begun so long ago
   double recover = 120.0;         ///< s without contradiction until what contradicted is taken for well
@@ -74,6 +75,7 @@ void visit(IntegrityConfig& c, Visitor& v) {
   v.group("tails", c.tails);
   v.group("witness", c.witness);
   v.number("correlated_share", c.correlated_share, 0.0, 1.0);
+  v.number("timing_std_s", c.timing_std, 0.0, 1.0);
   v.number("fault_prior", c.fault_prior, 1e-9, 1.0);
   v.number("look_back_s", c.look_back, 1.0, 300.0);
   v.number("recover_s", c.recover, 0.0, 3600.0);

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kAxes = 3.0;              // the risk is of an error in any axis
 constexpr double kInnovationMemory = 2.0;  // s, of their mean: a fault shows before it is followed
+constexpr double kCorrectionTime = 2.0;    // s, within which positions correct a heading
 constexpr double kLeastInnovations = 3.0;  // in the mean
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<const char*, 3> kAxisNames = {"along", "across", "up"};
@@ -93,6 +94,16 @@ void ProtectionMonitor::doubt() {
   if (seconds_between(anchor_.t_us, now.t_us) > config_.verify && agrees_with_anchor()) separation_.learn();
 }
 
+void ProtectionMonitor::doubt_since(int64_t t_us) {
+  if (!first_us_) return;
+  const Anchor& now = separation_.now();
+  failed_us_ = now.t_us;
+  returned_ = false;
+  if (anchored_ && anchor_.t_us <= t_us) return;
+  anchor_ = separation_.before(seconds_between(t_us, now.t_us)).value_or(now);
+  anchored_ = true;
+}
+
 void ProtectionMonitor::update_checks() {
   const Anchor& now = separation_.now();
   if (!first_us_) first_us_ = now.t_us;
@@ -129,7 +140,9 @@ void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out
   const double share = anchored_ || begins ? 1.0 : config_.correlated_share;
   const Eigen::Matrix3d R = estimate.T_frame_vehicle.R().transpose();
   const Eigen::Vector3d common = share * share * (R * fix_variance_.asDiagonal() * R.transpose()).diagonal();
-  const Eigen::Vector3d sigma = (separation_.now().cov.diagonal() + common).cwiseMax(0.0).cwiseSqrt();
+  const double late = config_.timing_std * turning_ * kCorrectionTime;  // a heading late by that, followed so long
+  const Eigen::Vector3d timing(0.0, late * late, 0.0);
+  const Eigen::Vector3d sigma = (separation_.now().cov.diagonal() + common + timing).cwiseMax(0.0).cwiseSqrt();
   const std::array<double, kRisks> risks = {config_.frequent_risk, config_.rare_risk};
   for (int r = 0; r < kRisks; ++r) {
     const double k = noise_.quantile(estimate.t_us, risks[static_cast<std::size_t>(r)] / kAxes);
@@ -203,6 +216,9 @@ Protection ProtectionMonitor::bound(const Odometry& estimate) {
   }
   out.level.fill(Eigen::Vector3d::Zero());
   out.hypothesis = Hypothesis::kNoFault;
+  const double dt = first_us_ ? seconds_between(separation_.now().t_us, estimate.t_us) : 0.0;
+  const double lateral = std::abs(estimate.velocity.x() * estimate.angular_rate.z());
+  turning_ = std::max(lateral, turning_ * std::exp(-std::max(0.0, dt) / kCorrectionTime));
   separation_.step(estimate);
   update_checks();
   if (!fix_us_) {

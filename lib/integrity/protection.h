@@ -56,6 +56,12 @@ class ProtectionMonitor {
   void add(const PositionInnovation& innovation);
   /// Dead reckoning that takes no positions; `jumps` differs where it began anew.
   void add_witness(const Odometry& pose, int64_t jumps) { separation_.add_witness(pose, jumps); }
+  /// Begin of the time that a contradiction leaves in doubt; nothing where there is none.
+  [[nodiscard]] std::optional<int64_t> doubted_since() const {
+    return anchored_ && !returned_ ? std::optional<int64_t>(anchor_.t_us) : std::nullopt;
+  }
+  /// What feeds this estimate is in doubt since then: so is this one, (I.5.6).
+  void doubt_since(int64_t t_us);
   /// The bound of a pose in ENU axes; an invalid one has none.
   Protection bound(const Odometry& estimate);
 
@@ -65,7 +71,7 @@ class ProtectionMonitor {
     ErrorScale::archive(self.noise_, a);
     ErrorScale::archive(self.whiteness_, a);
     a(self.fix_variance_, self.mean_innovation_, self.innovation_weight_, self.innovation_us_, self.fix_us_,
-      self.refused_us_, self.failed_us_, self.first_us_, self.checked_us_, self.fix_way_, self.anchored_,
+      self.refused_us_, self.failed_us_, self.first_us_, self.checked_us_, self.turning_, self.fix_way_, self.anchored_,
       self.returned_);
     Anchor::archive(self.anchor_, a);
   }
@@ -93,6 +99,7 @@ class ProtectionMonitor {
   Eigen::Vector3d mean_innovation_ = Eigen::Vector3d::Zero();  ///< of its own sigma, decaying
   double innovation_weight_ = 0.0;                             ///< how many it is of
   std::optional<int64_t> innovation_us_, fix_us_, refused_us_, failed_us_, first_us_, checked_us_;
+  double turning_ = 0.0;  ///< m/s2, the last seconds' largest lateral acceleration, decaying
   double fix_way_ = 0.0;  ///< m, driven until the last position
   bool anchored_ = false;
   Anchor anchor_;          ///< what is left of the time before positions came into doubt

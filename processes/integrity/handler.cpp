@@ -167,6 +167,9 @@ class IntegrityStage final : public Stage {
  private:
   void bound(std::size_t channel, const pose_t& pose) {
     Bounded& b = bounded_[channel];
+    // The fusion follows the INS.
+    const std::optional<int64_t> doubted = bounded_[0].monitor.doubted_since();
+    if (channel == 1 && doubted) b.monitor.doubt_since(*doubted);
     Odometry estimate = odometry(pose);
     if (pose.frame != pose_t::FRAME_ENU) estimate.validity = Validity::kInvalid;
     if (estimate.validity != Validity::kInvalid) {

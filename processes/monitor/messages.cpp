@@ -19,7 +19,7 @@ constexpr std::array<const char*, 14> kSources = {"GNSS position", "GNSS velocit
 
 using Row = std::pair<const char*, const char*>;
 /// The first prefix that fits.
-constexpr std::array<Row, 21> kTypes = {{{"IMU", "imu_t"},
+constexpr std::array<Row, 22> kTypes = {{{"IMU", "imu_t"},
                                          {"GNSS", "gnss_t"},
                                          {"WHEELS", "wheels_t"},
                                          {"MAG", "mag_t"},
@@ -27,6 +27,7 @@ constexpr std::array<Row, 21> kTypes = {{{"IMU", "imu_t"},
                                          {"RAW_", "raw_t"},
                                          {"POSE_", "pose_t"},
                                          {"REFERENCE", "pose_t"},
+                                         {"PROTECTION_", "protection_level_t"},
                                          {"INS_STATUS", "ins_status_t"},
                                          {"AIDING_", "aiding_t"},
                                          {"VO_STATUS", "vo_status_t"},

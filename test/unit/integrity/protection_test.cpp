@@ -151,6 +151,25 @@ TEST_CASE("protection: what has no position yet, or no valid pose, has no bound 
   CHECK(monitor.bound(invalid).reason == "the pose is not valid");
 }
 
+TEST_CASE("protection: what is fed by an estimate in doubt is held against its own pose of that time") {
+  CarOptions options = dragged();
+  const auto tell = [](double t, ProtectionMonitor& monitor) {
+    if (std::abs(t - 60.0) < 0.01) monitor.doubt_since(50'000'000);
+  };
+  const std::vector<CarSample> alone = drive(options, {}), told = drive(options, {}, tell);
+  CHECK(alone[650].protection.hypothesis != Hypothesis::kContradiction);
+  CHECK(told[650].protection.hypothesis == Hypothesis::kContradiction);
+  CHECK(told[650].protection.level[kRare].x() > alone[650].protection.level[kRare].x());
+}
+
+TEST_CASE("protection: in a bend the level across allows for stamps that are off") {
+  IntegrityConfig exact;
+  exact.timing_std = 0.0;
+  const std::vector<CarSample> off = drive({}, {}), on_time = drive({}, exact);
+  CHECK(off[700].protection.level[kFrequent].y() > on_time[700].protection.level[kFrequent].y() + 0.01);
+  CHECK(off[550].protection.level[kFrequent].y() == on_time[550].protection.level[kFrequent].y());
+}
+
 TEST_CASE("protection: a snapshot goes on to the same bits") {
   const std::vector<CarSample> whole = drive(dragged(), {});
   const auto exchange = [](double t, ProtectionMonitor& monitor) {

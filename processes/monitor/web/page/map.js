@@ -130,7 +130,11 @@ export class MapView {
     g.fillStyle = style('--muted');
     for (const fix of this.fixes) g.fillRect(this.x(fix.e) - 1.5, this.y(fix.n) - 1.5, 3, 3);
     for (const name of this.known) if (!this.hidden.has(name)) this.paintTrail(g, name);
-    for (const pose of this.frame ? this.frame.poses : []) if (pose.map && !this.hidden.has(pose.name)) this.paintMark(g, pose.name, pose.map, pose.name === this.frame.health.judged);
+    for (const pose of this.frame ? this.frame.poses : []) {
+      if (!pose.map || this.hidden.has(pose.name)) continue;
+      if (pose.bound) this.paintBound(g, pose.map, pose.bound);
+      this.paintMark(g, pose.name, pose.map, pose.name === this.frame.health.judged);
+    }
     if (!car) {
       g.fillStyle = style('--muted');
       g.textAlign = 'center';
@@ -190,6 +194,20 @@ export class MapView {
       g.stroke();
     }
     g.globalAlpha = 1;
+  }
+
+  /** The protection levels: a box along and across the car, red where the pose may not be used. */
+  paintBound(g, mark, bound) {
+    if (bound.along == null || bound.across == null) return;
+    const along = Math.min(1e5, bound.along * this.scale), across = Math.min(1e5, bound.across * this.scale);
+    g.save();
+    g.translate(this.x(mark.e), this.y(mark.n));
+    g.rotate(-mark.yaw);
+    g.strokeStyle = style(bound.usable ? '--ok' : '--bad');
+    g.lineWidth = 1.5;
+    g.setLineDash(bound.usable ? [] : [5, 4]);
+    g.strokeRect(-along, -across, 2 * along, 2 * across);
+    g.restore();
   }
 
   paintMark(g, name, mark, judged) {

@@ -25,6 +25,11 @@ export function showVerdict(frame, live) {
     const sigma = 'one standard deviation: the error is smaller two times out of three';
     facts.unshift(['Place sure to', valid ? `± ${metres(pose.sigma)}` : 'not known', '', sigma], ['Heading sure to', heading ? `± ${fixed(pose.yaw_sigma, 1)}` : 'not known', heading ? '°' : '', sigma],
       ['Speed', valid ? (Math.abs(pose.speed) * 3.6).toFixed(0) : 'not known', valid ? 'km/h' : '']);
+    if (valid && pose.bound) {
+      const { along, across, up, risk, usable, reason } = pose.bound;
+      const size = along == null ? 'without bound' : `${metres(along)} · ${metres(across)} · ${metres(up)}`;
+      facts.unshift([usable ? 'Bound: usable' : 'Bound: do not use', size, '', `along, across and up; exceeded once in ${Math.round(1 / risk)} poses${reason ? `. ${reason}` : ''}`]);
+    }
     if (valid && pose.err != null) facts.unshift(['Really off by', metres(pose.err), '', 'against the drive’s truth, which a car on the road does not have']);
   }
   byId('facts').replaceChildren(...facts.map(([name, value, unit, words]) => {

@@ -143,8 +143,8 @@ TEST_CASE("a vehicle's folder says what to expect") {
   std::map<std::string, double> rates;
   for (const ExpectedChannel& channel : demo.channels) rates[channel.name] = channel.rate.value_or(0.0);
   CHECK(rates == std::map<std::string, double>{{"IMU", 100.0}, {"GNSS", 4.0}, {"WHEELS", 20.0}, {"CAMERA_LEFT", 10.0}});
-  CHECK(demo.processes ==
-        std::vector<std::string>{"recorder", "gnss_ins_ekf", "wheel_odometry", "vo_tracker", "imm_fusion"});
+  CHECK(demo.processes == std::vector<std::string>{"recorder", "gnss_ins_ekf", "wheel_odometry", "vo_tracker",
+                                                   "imm_fusion", "integrity"});
   MonitorConfig config;
   config.channels = {{"IMU", 200.0}, {"POSE_VO", std::nullopt}};
   CHECK(expectations_of(config, test::source_path("configs/demo")).channels.front().rate == 200.0);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <roadfix/image_t.hpp>
 #include <roadfix/pose_t.hpp>
+#include <roadfix/protection_level_t.hpp>
 
 #include "bus/track_codec.h"
 #include "bus/types/message.h"
@@ -84,6 +85,29 @@ TEST_CASE("an absolute estimate is where it says, and its error is its distance 
   CHECK(fused["err"].get<double>() == Approx(1.0).margin(0.01));
   CHECK_FALSE(fused["map"]["pinned"].get<bool>());
   CHECK(bench.frame()["reference"]["n"].get<double>() == Approx(1.0));
+}
+
+TEST_CASE("a protection level is shown with the pose that it bounds, as long as that is new") {
+  Bench bench;
+  bench.drive(2.0);
+  protection_level_t level{};
+  level.pose_utime = kStart_us + 1'900'000;
+  level.num_risks = 2;
+  level.risk = {1e-3, 1e-5};
+  level.along_m = {0.5, 0.9};
+  level.across_m = {0.2, 0.3};
+  level.up_m = {1.0, INFINITY};
+  level.reason = "positions are not checked yet";
+  bench.send("PROTECTION_FUSED", kStart_us + 2'000'000, level);
+  bench.drive(2.4);
+  const auto bound = pose_of(bench.frame(), "POSE_FUSED")["bound"];
+  CHECK(bound["along"] == 0.9);
+  CHECK(bound["up"].is_null());
+  CHECK(bound["usable"] == false);
+  CHECK(bound["reason"] == "positions are not checked yet");
+  CHECK_FALSE(pose_of(bench.frame(), "POSE_WHEEL").contains("bound"));
+  bench.drive(4.0);
+  CHECK_FALSE(pose_of(bench.frame(), "POSE_FUSED").contains("bound"));
 }
 
 TEST_CASE("an estimate in a frame of its own is laid on the map where it began, and its drift shows") {
