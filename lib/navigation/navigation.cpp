@@ -234,7 +234,7 @@ void Navigation::align_again() {
   alignment_.hypotheses().stop();
   alignment_.forget_place();
   queue_.clear();
-  aiding_.gnss_position().clear_run();
+  aiding_.gnss_position().restart();
   predictor_stale_ = true;
   lag_us_ = lag_of(prior_age(config_.facts));
 }

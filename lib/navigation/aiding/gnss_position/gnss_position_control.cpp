@@ -38,6 +38,8 @@ double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
   return -0.5 * std::log(cov.determinant()) - 0.5 * (kTailFreedom + 2.0) * std::log1p(m / kTailFreedom);
 }
 
+Eigen::Vector3d return_variance() { return Eigen::Vector3d(kReturnLevel, kReturnLevel, kReturnUp).cwiseAbs2(); }
+
 }  // namespace
 
 GnssPositionControl::GnssPositionControl(const NavigationConfig& config)
@@ -48,7 +50,15 @@ GnssPositionControl::GnssPositionControl(const NavigationConfig& config)
 
 Eigen::Vector3d GnssPositionControl::lasting_std(const GnssFix& fix) const {
   const Receiver& r = receiver(fix.fix_type);
-  return (r.lasting_share * r.scale.variance_factor() * fix.cov_enu.diagonal()).cwiseSqrt();
+  Eigen::Vector3d variance = r.lasting_share * r.scale.variance_factor() * fix.cov_enu.diagonal();
+  if (returns(fix.t_us, fix.fix_type)) variance += return_variance();
+  return variance.cwiseSqrt();
+}
+
+/// After an outage a receiver without a fixed phase may come back displaced.
+bool GnssPositionControl::returns(int64_t t_us, FixType type) const {
+  return tried_at_us_ != 0 && seconds_between(tried_at_us_, t_us) > kOutage && type != FixType::kRtkFixed &&
+         config_.aiding.lasting_errors;
 }
 
 GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const {
@@ -56,10 +66,9 @@ GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const 
   Bias bias;
   bias.stationary_std = (r.lasting_share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
   bias.std = bias.stationary_std;
-  const bool returns = tried_at_us_ != 0 && seconds_between(tried_at_us_, fix.t_us) > kOutage;
-  bias.anew = tried_at_us_ == 0 || returns || fix.fix_type != last_type_;
-  if (returns && fix.fix_type != FixType::kRtkFixed && config_.aiding.lasting_errors)
-    bias.std = (bias.std.cwiseAbs2() + Eigen::Vector3d(kReturnLevel, kReturnLevel, kReturnUp).cwiseAbs2()).cwiseSqrt();
+  const bool after_outage = tried_at_us_ != 0 && seconds_between(tried_at_us_, fix.t_us) > kOutage;
+  bias.anew = tried_at_us_ == 0 || after_outage || fix.fix_type != last_type_;
+  if (returns(fix.t_us, fix.fix_type)) bias.std = (bias.std.cwiseAbs2() + return_variance()).cwiseSqrt();
   return bias;
 }
 

@@ -38,8 +38,14 @@ class GnssPositionControl {
   [[nodiscard]] bool displaced() const { return displaced_since_us_ != 0; }
   /// The height alone is displaced.
   [[nodiscard]] bool height_displaced() const { return height_displaced_; }
-  /// The filter has lost its past (a gap, a new start): nothing holds against the receiver.
+  /// The filter has a gap in its past: nothing holds against the receiver.
   void clear_run() { rejected_ = 0; }
+  /// The filter starts anew: what contradicted the receiver is gone.
+  void restart() {
+    rejected_ = 0;
+    displaced_since_us_ = 0;
+    height_displaced_ = false;
+  }
 
   template <class Archive>
   void serialise(Archive& a) {
@@ -65,6 +71,7 @@ class GnssPositionControl {
   };
 
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
+  [[nodiscard]] bool returns(int64_t t_us, FixType type) const;
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
   void set_bias(Filter& filter, const Bias& bias) const;
