@@ -77,6 +77,15 @@ TEST_CASE("a gyro that clips in turns does not leave a lost filter that calls it
   }
 }
 
+TEST_CASE("a receiver that drifts off at 0.3 m/s claiming centimetres is found out and left") {
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    CAPTURE(seed);
+    check_held(drive_with("gnss.ramp@80+30:east_mps=0.3", 140.0, seed), 1.5, 0.2);
+  }
+  // What cannot be known, and teeth: two centimetres a second are followed.
+  CHECK(drive_with("gnss.ramp@80+50:east_mps=0.02", 140.0, 2).horizontal > 0.5);
+}
+
 TEST_CASE("a receiver that is dragged off at half a metre a second is held against") {
   check_held(drive_with("gnss.ramp@80+40:east_mps=0.5", 150.0, 2), 1.5, 0.2);
   // What cannot be told: a drag that lasts is believed in the end, with a reset that says so.
