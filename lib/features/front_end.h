@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "camera/camera.h"
 #include "stream/state_bytes.h"
 
 namespace roadfix {
@@ -83,6 +84,10 @@ class FrontEnd {
   /// Finds the active tracks in the next image (8-bit grey) and returns those found, in ascending order of track.
   /// Tracks without a prediction are searched at their last position. Tracks not found end.
   virtual std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> predictions) = 0;
+
+  /// The lens, and the direction in camera axes in which the camera travels: what patches of slanted planes need for
+  /// their point (features/perspective_bend.h). Before the first image; front ends without patches have no use for it.
+  virtual void set_camera(const Camera& /*camera*/, const Eigen::Vector3d& /*travel*/) {}
 
   /// Starts new tracks in the image of the last track() where there is room; returns the new ones.
   virtual std::vector<Feature> replenish() = 0;

@@ -42,8 +42,18 @@ bool KltTracks::update_template(Track& track, const cv::Mat& gray, int window_px
   if (!fresh) return false;
   track.patch = std::move(*fresh);
   track.model = {};
+  track.template_pixel = track.feature.pixel;
   track.alignment = {track.feature.pixel - track.patch.offset};
   return true;
+}
+
+/// The feature in the image that the patch is aligned with.
+Eigen::Vector2f KltTracks::point(const Track& track) const {
+  const Eigen::Vector2f affine = track.alignment.point(track.patch);
+  if (!perspective_) return affine;
+  const PatchBend bend = perspective_->of(track.template_pixel.cast<double>(), affine.cast<double>(),
+                                          track.alignment.shape.cast<double>());
+  return affine - track.alignment.shape * track.model.shift(bend);
 }
 
 PatchConfig KltTracks::patch_config() const {
@@ -75,7 +85,7 @@ bool KltTracks::locate(Track& track, const Eigen::Vector2f& predicted, const Flo
     }
   }
   track.alignment = *alignment;
-  track.feature.pixel = alignment->point(track.patch);
+  track.feature.pixel = point(track);
   if (template_outdated(track.alignment)) (void)update_template(track, gray, config.window_px);
   return true;
 }
@@ -142,7 +152,10 @@ std::vector<Feature> KltTracks::replenish() {
     auto patch = extract_patch(pyramid_.image(), corner.pixel, config_.klt_window_px);
     if (!patch) continue;
     fresh.push_back({next_track_++, corner.pixel});
-    tracks_.push_back({.feature = fresh.back(), .patch = std::move(*patch), .alignment = {corner.pixel}});
+    tracks_.push_back({.feature = fresh.back(),
+                       .patch = std::move(*patch),
+                       .template_pixel = corner.pixel,
+                       .alignment = {corner.pixel}});
   }
   return fresh;
 }
@@ -159,6 +172,7 @@ void KltTracks::save(StateWriter& writer) const {
   for (const Track& track : tracks_) {
     writer.put(std::span<const uint8_t>(track.patch.grey));
     writer.put(track.patch.offset);
+    writer.put(track.template_pixel);
     writer.put(track.alignment.centre);
     writer.put(track.alignment.shape);
     writer.put(track.alignment.correlation);
@@ -177,6 +191,7 @@ void KltTracks::load(StateReader& reader) {
     reader.get(track.patch.grey);
     if (track.patch.grey.size() != side * side) throw std::runtime_error("state: a patch of the wrong size");
     reader.get(track.patch.offset);
+    reader.get(track.template_pixel);
     reader.get(track.alignment.centre);
     reader.get(track.alignment.shape);
     reader.get(track.alignment.correlation);

@@ -8,6 +8,7 @@
 #include "features/flow.h"
 #include "features/front_end.h"
 #include "features/patch.h"
+#include "features/perspective_bend.h"
 
 namespace roadfix {
 
@@ -16,6 +17,9 @@ class KltTracks final : public FrontEnd {
   explicit KltTracks(const FrontEndConfig& config) : config_(config) {}
 
   std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> predictions) override;
+  void set_camera(const Camera& camera, const Eigen::Vector3d& travel) override {
+    perspective_.emplace(camera, travel);
+  }
   std::vector<Feature> replenish() override;
   void drop(std::span<const int64_t> tracks) override;
   void reset() override;
@@ -27,8 +31,9 @@ class KltTracks final : public FrontEnd {
   struct Track {
     Feature feature;  ///< position in the last image
     Patch patch;
-    PatchAlignment alignment;  ///< of the patch in the last image
-    PatchModel<6> model{};     ///< of the template; recomputed after load()
+    Eigen::Vector2f template_pixel = Eigen::Vector2f::Zero();  ///< of the feature, where the template is from
+    PatchAlignment alignment;                                  ///< of the patch in the last image
+    PatchModel<6> model{};                                     ///< of the template; recomputed after load()
   };
   [[nodiscard]] PatchConfig patch_config() const;
   /// Finds the track in the new image near `expected`; false where it is not found.
@@ -39,7 +44,10 @@ class KltTracks final : public FrontEnd {
   [[nodiscard]] std::vector<Eigen::Vector2f> predicted_pixels(std::span<const Feature> predictions) const;
   [[nodiscard]] std::vector<Feature> features() const;
 
+  [[nodiscard]] Eigen::Vector2f point(const Track& track) const;
+
   FrontEndConfig config_;
+  std::optional<PerspectiveBend> perspective_;
   int64_t next_track_ = 1;
   int num_expected_ = 0;
   std::vector<Track> tracks_;  ///< ascending by number

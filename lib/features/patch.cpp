@@ -78,6 +78,35 @@ void read_pixels(const Patch& patch, int side, PatchModel<N>& m) {
   }
 }
 
+/// The least-squares translation that stands for each element of a bend: the row of the estimator for u and v, times
+/// the change of intensity that the element makes.
+template <int N>
+void respond_to_bend(const Patch& patch, int side, PatchModel<N>& m) {
+  const ptrdiff_t n = padded(m.count), stride = side + 2;
+  const int half = side / 2;
+  Pixels row_u{}, row_v{};
+  for (int k = 0; k < N; ++k) {
+    const float* slope = m.pixels.data() + (k + 1) * n;
+    for (ptrdiff_t i = 0; i < n; i += kLanes) {
+      Eigen::Map<Lanes>(row_u.data() + i) += m.inverse(0, k) * lanes(slope + i);
+      Eigen::Map<Lanes>(row_v.data() + i) += m.inverse(1, k) * lanes(slope + i);
+    }
+  }
+  size_t i = 0;
+  for (int row = 0; row < side; ++row) {
+    const uint8_t* line = patch.grey.data() + (row + 1) * stride + 1;
+    for (int column = 0; column < side; ++column, ++i) {
+      const auto x = static_cast<float>(column - half), y = static_cast<float>(row - half);
+      const Eigen::Vector2f slope(0.5F * static_cast<float>(line[column + 1] - line[column - 1]),
+                                  0.5F * static_cast<float>(line[column + stride] - line[column - stride]));
+      const Eigen::Matrix<float, 1, 6> change = (Eigen::Matrix<float, 1, 6>() << x * x * slope.transpose(),
+                                                 x * y * slope.transpose(), y * y * slope.transpose())
+                                                    .finished();
+      m.per_bend += Eigen::Vector2f(row_u[i], row_v[i]) * change;
+    }
+  }
+}
+
 /// Removes mean and intensity pattern from the derivatives. False where the texture is too weak.
 template <int N>
 bool prepare(const Patch& patch, int side, float prior, PatchModel<N>& m) {
@@ -101,6 +130,7 @@ bool prepare(const Patch& patch, int side, float prior, PatchModel<N>& m) {
   }
   const Eigen::LDLT<Square<N>> factors(H);
   m.inverse = factors.solve(Square<N>::Identity());
+  if constexpr (N == 6) respond_to_bend(patch, side, m);
   const float widest = m.inverse.template topLeftCorner<2, 2>().trace();  // upper bound of the larger eigenvalue
   return factors.info() == Eigen::Success && widest >= 0.0F &&
          kIntensityNoise * kIntensityNoise * widest < kMaxPositionStd_px * kMaxPositionStd_px;

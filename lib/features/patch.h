@@ -40,6 +40,9 @@ struct PatchAlignment {
   [[nodiscard]] Eigen::Vector2f point(const Patch& patch) const { return centre + shape * patch.offset; }
 };
 
+/// Second order of a warp in the template's pixels: x goes to shape * (x + bend * (x x, x y, y y)).
+using PatchBend = Eigen::Matrix<float, 2, 3>;
+
 /// Precomputed terms of the template for N unknowns: translation, or translation and shape.
 template <int N>
 struct PatchModel {
@@ -49,6 +52,13 @@ struct PatchModel {
   float energy = 0.0F;        ///< squared norm of the intensities
   Eigen::Matrix<float, N, N> inverse = Eigen::Matrix<float, N, N>::Zero();  ///< inverse Gauss-Newton matrix, prior
                                                                             ///< included
+  /// Template pixels by which alignment without the second order moves the centre, per element of the bend (column by
+  /// column): depends on where in the window the texture is.
+  Eigen::Matrix<float, 2, 6> per_bend = Eigen::Matrix<float, 2, 6>::Zero();
+
+  [[nodiscard]] Eigen::Vector2f shift(const PatchBend& bend) const {
+    return per_bend * Eigen::Map<const Eigen::Matrix<float, 6, 1>>(bend.data());
+  }
 };
 
 /// No value where the window is not within the image.

@@ -75,6 +75,7 @@ KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const Came
       map_(rig, config_),
       T_map_camera_(rig.T_vehicle_left),
       loops_(loop_config(config_, rig)) {
+  front_end_->set_camera(left_, rig.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitX());
   if (!rig.right) return;
   stereo_ = std::move(right_matcher);
   if (!stereo_) {

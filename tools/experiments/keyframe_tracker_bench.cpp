@@ -42,6 +42,7 @@ Sequence load(const std::filesystem::path& folder, bool mono) {
   }
   const auto& p0 = calibration.at("P0:");
   const auto& p1 = calibration.at("P1:");
+  s.rig.T_vehicle_left.q = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);  // a vehicle at the camera, which looks ahead
   s.rig.left.fx = s.rig.left.fy = p0.at(0);
   s.rig.left.cx = p0.at(2);
   s.rig.left.cy = p0.at(6);
