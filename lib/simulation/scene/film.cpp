@@ -32,11 +32,12 @@ Film::Film(const SimulatedDrive& drive, Executor& executor)
 
 bool Film::advance() {
   if (next_ == drive_.exposures.size()) return false;
+  const bool first = clean_left_.pixels.empty();
   const std::int64_t t_us = drive_.exposures[next_++];
   renderer_.render(scene_, view_at(drive_, rig_.T_vehicle_left, t_us), executor_, light_[0]);
   if (drive_.config.camera.layout == CameraLayout::kStereo)
     renderer_.render(scene_, view_at(drive_, rig_.T_vehicle_right, t_us), executor_, light_[1]);
-  if (next_ > 1) exposure_ = next_exposure(sensor_.exposure, sensor_, exposure_, clean_left_);
+  if (!first) exposure_ = next_exposure(sensor_.exposure, sensor_, exposure_, clean_left_);
   clean_left_ = develop(CameraSide::kLeft, {});
   return true;
 }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "simulation/scene/drive_scene.h"
 #include "simulation/scene/sensor.h"
@@ -21,6 +22,13 @@ class Film {
 
   /// Takes the next of drive.exposures; false where there is none.
   bool advance();
+
+  /// When the next exposure is; no value at the drive's end.
+  [[nodiscard]] std::optional<std::int64_t> next_us() const {
+    return next_ < drive_.exposures.size() ? std::optional(drive_.exposures[next_]) : std::nullopt;
+  }
+  /// Takes no picture of it. Exposure control goes on from where it is.
+  void skip() { ++next_; }
 
   // Of the newest exposure, after advance():
   [[nodiscard]] std::size_t taken() const { return next_ - 1; }

@@ -1,0 +1,274 @@
+/// The keyframe tracker on drawn pictures, held against the truth: what its motion over a stretch loses.
+///   vision_drives SCENARIO FIRST_SEED LAST_SEED [--size WIDTHxHEIGHT] [--stereo] [--from S] [--to S]
+///                 [--perspective on|off|both]
+/// Lengths are those of the drive's wheels without their scale error. `off`: affine patches without the correction of their second order
+/// (features/perspective_bend.h). Prints, per seed, yaw (positive: turned too far to the left), pitch, across and
+/// along, each estimate minus truth over the whole stretch; then means with standard errors, and the NEES of relative
+/// poses over 5 s and over the stretch, rotation and translation apart.
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "features/front_end.h"
+#include "geometry/determinism.h"
+#include "geometry/so3.h"
+#include "program.h"
+#include "simulation/scenarios.h"
+#include "simulation/scene/film.h"
+#include "slam/keyframe_tracker.h"
+#include "slam/pose_covariance.h"
+#include "stream/executor.h"
+
+namespace roadfix {
+namespace {
+
+constexpr int64_t kWindow_us = 5'000'000;
+constexpr double kWheelNoise = 0.03;
+constexpr int64_t kSettle_us = 4'000'000;  ///< from the first picture to the stretch's begin
+
+struct Options {
+  std::string scenario;
+  int first = 1, last = 1;
+  int width = 0, height = 0;
+  bool stereo = false;
+  double from_s = 0.0, to_s = 1e9;
+  std::string perspective = "on";
+  KeyframeTrackerConfig tracker;
+};
+
+/// A front end that is not told of the lens: patches without the correction.
+class WithoutLens final : public FrontEnd {
+ public:
+  explicit WithoutLens(std::unique_ptr<FrontEnd> inner) : inner_(std::move(inner)) {}
+  std::vector<Feature> track(const cv::Mat& gray, std::span<const Feature> predictions) override {
+    return inner_->track(gray, predictions);
+  }
+  std::vector<Feature> replenish() override { return inner_->replenish(); }
+  void drop(std::span<const int64_t> tracks) override { inner_->drop(tracks); }
+  void reset() override { inner_->reset(); }
+  void save(StateWriter& writer) const override { inner_->save(writer); }
+  void load(StateReader& reader) override { inner_->load(reader); }
+  [[nodiscard]] int num_expected() const override { return inner_->num_expected(); }
+
+ private:
+  std::unique_ptr<FrontEnd> inner_;
+};
+
+struct Stamped {
+  int64_t t_us = 0;
+  SE3 T_found, T_true;
+  Matrix6d cov, image, map;
+};
+
+struct Loss {
+  Vector6d error = Vector6d::Zero();  ///< place, then rotation; axes of the first pose
+  double nees_place = 0.0, nees_turn = 0.0;
+};
+
+/// The motion between two poses against the true one. Its covariance: what is added between the two, and what does not
+/// accumulate, at both.
+Loss loss(const Stamped& a, const Stamped& b) {
+  const SE3 found = a.T_found.inverse() * b.T_found, truth = a.T_true.inverse() * b.T_true;
+  Loss l;
+  l.error.head<3>() = found.p - truth.p;
+  l.error.tail<3>() = log_q(found.q * truth.q.conjugate());
+  const Eigen::Matrix3d R = a.T_found.R();
+  const Matrix6d P = b.cov - transported(a.cov, a.T_found, found) +
+                     transported(Matrix6d(2.0 * a.image + a.map), a.T_found, found) + b.map;
+  const Eigen::Matrix3d place = R.transpose() * P.topLeftCorner<3, 3>() * R;
+  const Eigen::Matrix3d turn = found.R() * P.bottomRightCorner<3, 3>() * found.R().transpose();
+  const Eigen::Vector3d p = l.error.head<3>(), r = l.error.tail<3>();
+  l.nees_place = p.dot(place.ldlt().solve(p)) / 3.0;
+  l.nees_turn = r.dot(turn.ldlt().solve(r)) / 3.0;
+  return l;
+}
+
+class Run {
+ public:
+  Run(const Options& options, const SimulatedDrive& drive, const SimulatedRig& rig, bool perspective)
+      : drive_(drive),
+        tracker_(options.tracker, rig_for(options, drive, rig), front_end(options, perspective), executor_) {}
+
+  void speed(const WheelSample& w) {
+    double mean = 0.0;
+    const int first = w.num_speeds == 4 ? 2 : 0;  // the rear axle
+    for (int k = first; k < w.num_speeds; ++k) {
+      const auto wheel = static_cast<size_t>(k);
+      mean += w.speeds[wheel] / (1.0 + drive_.errors.wheel_scale[wheel]) / (w.num_speeds - first);
+    }
+    tracker_.speed({w.t_us, SpeedSource::kWheels, mean, kWheelNoise, 0.0});
+  }
+
+  void process(int64_t t_us, const cv::Mat& left, const cv::Mat& right) {
+    const TrackedFrame& out = tracker_.process({t_us, left, right});
+    if (out.odometry.validity != Validity::kValid) return;
+    poses.push_back({t_us, out.odometry.T_frame_vehicle, drive_.truth_at(t_us).T_frame_vehicle, out.odometry.cov_pose,
+                     out.cov_image, out.cov_map});
+    resets = out.reset_counter;
+  }
+
+  std::vector<Stamped> poses;
+  int resets = 0;
+
+ private:
+  static CameraRig rig_for(const Options& options, const SimulatedDrive& drive, const SimulatedRig& rig) {
+    CameraRig r;
+    r.left = rig.camera.intrinsics();
+    r.T_vehicle_left = rig.T_vehicle_left;
+    if (!options.stereo) return r;
+    r.right = r.left;
+    r.T_right_left = T_left_right(drive.config.camera).inverse();
+    r.scale_sigmas = {};
+    return r;
+  }
+  static std::unique_ptr<FrontEnd> front_end(const Options& options, bool perspective) {
+    auto made = make_front_end(options.tracker.front_end);
+    if (perspective) return made;
+    return std::make_unique<WithoutLens>(std::move(made));
+  }
+
+  const SimulatedDrive& drive_;
+  InlineExecutor executor_;
+  KeyframeTracker tracker_;
+};
+
+cv::Mat as_sent(const GrayImage& picture, int quality) {
+  const cv::Mat view(picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
+  std::vector<std::uint8_t> file;
+  cv::imencode(".jpg", view, file, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return cv::imdecode(file, cv::IMREAD_GRAYSCALE);
+}
+
+struct Totals {
+  std::vector<Vector6d> errors;
+  double nees[4] = {};  ///< over 5 s, place and rotation; over the stretch
+  int windows = 0;
+};
+
+double degrees(double rad) { return rad * 180.0 / M_PI; }
+
+void add(const char* name, int seed, const Run& run, const Options& options, int64_t start_us, Totals& totals) {
+  const auto from = start_us + static_cast<int64_t>(options.from_s * 1e6);
+  std::vector<Stamped> poses;
+  for (const Stamped& s : run.poses)
+    if (s.t_us >= from) poses.push_back(s);
+  if (poses.size() < 2) {
+    std::printf("%-4s seed %d: no poses\n", name, seed);
+    return;
+  }
+  const Loss all = loss(poses.front(), poses.back());
+  totals.errors.push_back(all.error);
+  totals.nees[2] += all.nees_place;
+  totals.nees[3] += all.nees_turn;
+  for (size_t i = 0, j = 0; i < poses.size(); i = j) {
+    while (j < poses.size() && poses[j].t_us - poses[i].t_us < kWindow_us) ++j;
+    if (j == poses.size()) break;
+    const Loss l = loss(poses[i], poses[j]);
+    totals.nees[0] += l.nees_place;
+    totals.nees[1] += l.nees_turn;
+    ++totals.windows;
+  }
+  const Vector6d& e = all.error;
+  std::printf(
+      "%-4s seed %d: yaw %+.3f pitch %+.3f roll %+.3f deg, along %+.3f across %+.3f m, NEES place %.2f turn %.2f, %zu "
+      "poses, %d resets\n",
+      name, seed, degrees(e(5)), degrees(e(4)), degrees(e(3)), e(0), e(1), all.nees_place, all.nees_turn, poses.size(),
+      run.resets);
+  std::fflush(stdout);
+}
+
+void print(const char* name, const Totals& t) {
+  const auto n = static_cast<double>(t.errors.size());
+  if (t.errors.size() < 2) return;
+  Vector6d mean = Vector6d::Zero(), square = Vector6d::Zero();
+  for (const Vector6d& e : t.errors) mean += e / n;
+  for (const Vector6d& e : t.errors) square += (e - mean).cwiseAbs2() / (n - 1.0);
+  const Vector6d error = (square / n).cwiseSqrt();
+  std::printf(
+      "%-4s mean of %.0f: yaw %+.3f +- %.3f deg, pitch %+.3f +- %.3f, along %+.3f +- %.3f m, across %+.3f +- %.3f; rms "
+      "yaw %.3f\n",
+      name, n, degrees(mean(5)), degrees(error(5)), degrees(mean(4)), degrees(error(4)), mean(0), error(0), mean(1),
+      error(1), degrees(std::sqrt(square(5) + mean(5) * mean(5))));
+  std::printf("%-4s NEES over 5 s: place %.2f turn %.2f (%d windows); over the stretch: place %.2f turn %.2f\n", name,
+              t.nees[0] / t.windows, t.nees[1] / t.windows, t.windows, t.nees[2] / n, t.nees[3] / n);
+}
+
+void drive(const Options& options, int seed, std::vector<Totals>& totals) {
+  ScenarioConfig config = scenario(options.scenario);
+  if (options.width > 0) config.camera = with_size(config.camera, options.width, options.height);
+  config.camera.layout = options.stereo ? CameraLayout::kStereo : CameraLayout::kMono;
+  const SimulatedDrive drive = simulate(config, static_cast<std::uint64_t>(seed));
+  const SimulatedRig rig = rig_of(drive);
+  InlineExecutor executor;
+  Film film(drive, executor);
+  std::vector<std::unique_ptr<Run>> runs;
+  if (options.perspective != "off") runs.push_back(std::make_unique<Run>(options, drive, rig, true));
+  if (options.perspective != "on") runs.push_back(std::make_unique<Run>(options, drive, rig, false));
+  const int64_t start_us = drive.exposures.front();
+  const auto begin = start_us + std::max<int64_t>(0, static_cast<int64_t>(options.from_s * 1e6) - kSettle_us);
+  while (film.next_us() && *film.next_us() < begin) film.skip();
+  auto wheel = drive.wheels.begin();
+  while (film.advance()) {
+    const int64_t t_us = drive.exposures[film.taken()];
+    if (static_cast<double>(t_us - start_us) > options.to_s * 1e6) break;
+    for (; wheel != drive.wheels.end() && wheel->t_us <= t_us; ++wheel)
+      for (auto& run : runs) run->speed(*wheel);
+    const cv::Mat left = as_sent(film.picture(CameraSide::kLeft, {}), config.camera.jpeg_quality);
+    const cv::Mat right =
+        options.stereo ? as_sent(film.picture(CameraSide::kRight, {}), config.camera.jpeg_quality) : cv::Mat();
+    for (auto& run : runs) run->process(t_us, left, right);
+  }
+  for (size_t k = 0; k < runs.size(); ++k)
+    add(options.perspective == "off" || k == 1 ? "off" : "on", seed, *runs[k], options, start_us, totals[k]);
+}
+
+Options parse(int argc, char** argv) {
+  if (argc < 4) throw std::invalid_argument("usage: vision_drives SCENARIO FIRST_SEED LAST_SEED [options]");
+  Options o;
+  o.scenario = argv[1];
+  o.first = std::stoi(argv[2]);
+  o.last = std::stoi(argv[3]);
+  for (int i = 4; i < argc; ++i) {
+    const std::string key = argv[i];
+    if (key == "--stereo") {
+      o.stereo = true;
+      continue;
+    }
+    if (++i == argc) throw std::invalid_argument(key + " needs a value");
+    const std::string value = argv[i];
+    if (key == "--size") {
+      if (std::sscanf(value.c_str(), "%dx%d", &o.width, &o.height) != 2)
+        throw std::invalid_argument("--size: WIDTHxHEIGHT");
+    } else if (key == "--from") {
+      o.from_s = std::stod(value);
+    } else if (key == "--to") {
+      o.to_s = std::stod(value);
+    } else if (key == "--perspective") {
+      if (value != "on" && value != "off" && value != "both")
+        throw std::invalid_argument("--perspective: on, off, both");
+      o.perspective = value;
+    } else {
+      throw std::invalid_argument("unknown option " + key);
+    }
+  }
+  return o;
+}
+
+int run(int argc, char** argv) {
+  fix_eigen_blocking();
+  fix_opencv_threads();
+  const Options options = parse(argc, argv);
+  std::vector<Totals> totals(2);
+  for (int seed = options.first; seed <= options.last; ++seed) drive(options, seed, totals);
+  print(options.perspective == "off" ? "off" : "on", totals[0]);
+  print("off", totals[1]);
+  return 0;
+}
+
+}  // namespace
+}  // namespace roadfix
+
+int main(int argc, char** argv) { return roadfix::bench::run_as("vision_drives", roadfix::run, argc, argv); }
