@@ -62,6 +62,15 @@ OutageError error_at_end(const PosePair& end, const Outage& outage, const Trajec
 
 }  // namespace
 
+std::vector<Outage> outages_between(const std::vector<int64_t>& accepted_us, double least_s) {
+  std::vector<Outage> outages;
+  for (std::size_t i = 1; i < accepted_us.size(); ++i) {
+    if (seconds_between(accepted_us[i - 1], accepted_us[i]) <= least_s) continue;
+    outages.push_back({accepted_us[i - 1] + 1, accepted_us[i] - 1, accepted_us[i]});
+  }
+  return outages;
+}
+
 OutageErrors outage_errors(const Trajectory& estimate, const Trajectory& reference, const std::vector<Outage>& outages,
                            const std::vector<PoseError>& errors, const ReferenceKind& kind) {
   OutageErrors out;

@@ -13,6 +13,13 @@ namespace roadfix {
 inline constexpr double kTransition = 5.0;
 inline constexpr double kSettled = 0.3;
 
+/// Longer without an accepted fix is an outage, s.
+inline constexpr double kLeastOutage = 2.0;
+
+/// The outages of a recorded drive, from the times at which an estimator accepted a position fix, in order. The error of one
+/// is that at its end, just before the next fix.
+std::vector<Outage> outages_between(const std::vector<int64_t>& accepted_us, double least_s = kLeastOutage);
+
 struct OutageError {
   Outage outage;
   double duration_s = 0.0;    ///< from the first to the last withheld fix

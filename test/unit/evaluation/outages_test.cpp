@@ -50,6 +50,22 @@ TEST_CASE("the error of an outage is the one at its last withheld fix") {
   CHECK(errors.missing == 0);
 }
 
+TEST_CASE("outages of a recorded drive are the gaps between accepted fixes") {
+  std::vector<int64_t> fixes;
+  for (int64_t t = 0; t <= 250; ++t)
+    if (t < 60 || t > 90) fixes.push_back(t * kSecond);
+  const std::vector<Outage> found = outages_between(fixes);
+  REQUIRE(found.size() == 1);
+  CHECK(found[0].first_withheld_us == 59 * kSecond + 1);
+  CHECK(found[0].return_us == 91 * kSecond);
+  CHECK(outages_between(fixes, 32.0).empty());  // teeth: 32 s are not more
+  CHECK(outages_between(fixes, 0.5).size() == fixes.size() - 1);
+  CHECK(outages_between({}).empty());
+  const OutageErrors errors = outage_errors(drifting(0.1, 0.0), kReference, found, errors_of(drifting(0.1, 0.0)), {});
+  REQUIRE(errors.each.size() == 1);
+  CHECK(errors.each[0].horizontal_m == Approx(3.0).epsilon(0.05));
+}
+
 TEST_CASE("an outage without an estimate at its end is missing and not zero") {
   Trajectory estimate = drifting(0.1, 0.0);
   std::erase_if(estimate.poses, [](const Odometry& pose) { return pose.t_us > 185 * kSecond; });
