@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/euler.h"
-#include "geometry/frames.h"
-#include "geometry/so3.h"
+#include "fusion/saved.h"
 
 namespace roadfix {
 
@@ -13,223 +11,271 @@ using namespace fusion;
 
 namespace {
 
-constexpr double kUnknownPosition = 1e-3;  ///< m: a local frame begins where it begins
-constexpr double kUnknownSpeed = 50.0;     ///< m/s
-constexpr double kShortestDoubt = 0.1;     ///< s
-constexpr double kLongestMap = 1e6;        ///< s
-constexpr double kLongestStep = 0.1;       ///< s, of the motion models; longer silences go in several
+constexpr FusionChannel kAll[] = {FusionChannel::kIns, FusionChannel::kVo, FusionChannel::kWheel};
+constexpr double kLatestEpoch = 0.4;    ///< s, by which an epoch waits for a picture
+constexpr double kLatestPicture = 0.5;  ///< s behind the others
+constexpr double kRepeated = 0.3;       ///< s, of one pose: frozen, if the vehicle moves
+constexpr double kMoves = 0.5;          ///< m/s
+constexpr double kLeastWay = 2.0;       ///< m, of a window that shows a scale
+constexpr double kRestartAfter = 0.5;   ///< s, for which vision must be lost
+constexpr double kRawScale = 1.0;       ///< sigma of a log scale of which nothing is known
 
-/// Of all elements at once: what is finite is nothing times zero.
-template <class Values>
-bool finite(const Values& values) {
-  return (values.array() * 0.0).sum() == 0.0;
-}
-
-bool usable(const Odometry& o) {
-  return finite(o.T_frame_vehicle.p) && std::abs(o.T_frame_vehicle.q.norm() - 1.0) < 1e-3 && finite(o.velocity) &&
-         finite(o.angular_rate) && finite(o.cov_pose) && finite(o.cov_velocity) &&
-         o.cov_pose.diagonal().minCoeff() >= 0.0;
-}
-
-bool usable(const PlanarPassing& e) {
-  return finite(e.picture) && finite(e.map) && e.picture.diagonal().minCoeff() >= 0.0 &&
-         e.map.diagonal().minCoeff() >= 0.0 && e.map_time >= 0.0 && e.map_time < kLongestMap;
+MotionSum sum_of(const WindowMotion& window) {
+  MotionSum sum;
+  sum.motion = window.motion;
+  sum.Q = window.noise;
+  sum.by_calibration = window.by_calibration;
+  sum.dt = window.dt;
+  return sum;
 }
 
 }  // namespace
 
-Fusion::Fusion(const FusionConfig& config) : config_(config) {}
+Fusion::Fusion(const FusionConfig& config)
+    : config_(config),
+      channels_{PoseChannel(FusionChannel::kIns, config.ins), PoseChannel(FusionChannel::kVo, config.vo),
+                PoseChannel(FusionChannel::kWheel, config.wheel)},
+      witnesses_(config.agreement),
+      local_(config),
+      failover_(config) {}
 
-ChannelSlots Fusion::slots(FusionChannel c) {
-  switch (c) {
-    case FusionChannel::kVo:
-      return {kVoClone, kVoScale, kVoTurns, std::nullopt, std::nullopt};
-    case FusionChannel::kWheel:
-      return {kWheelClone, kWheelScale, std::nullopt, std::nullopt, std::nullopt};
-    case FusionChannel::kIns:
-      break;
-  }
-  return {kInsClone, std::nullopt, std::nullopt, kInsDrift, kInsVelocity};
-}
-
-double Fusion::timeout(FusionChannel c) const {
-  if (c == FusionChannel::kIns) return config_.ins_timeout;
-  return c == FusionChannel::kVo ? config_.vo_timeout : config_.wheel_timeout;
-}
-
-const MotionFloor& Fusion::floor(FusionChannel c) const {
-  if (c == FusionChannel::kIns) return config_.ins_floor;
-  return c == FusionChannel::kVo ? config_.vo_floor : config_.wheel_floor;
-}
-
-/// What the sample says of it, or where it does not, the configuration.
-PlanarPassing Fusion::passing(const ChannelSample& s) const {
-  if (s.passing || s.channel != FusionChannel::kVo) return s.passing.value_or(PlanarPassing{});
-  const Eigen::Vector3d sigma(config_.vo_jitter, config_.vo_jitter, config_.vo_yaw_jitter);
-  return {sigma.cwiseAbs2().asDiagonal(), Eigen::Matrix3d::Zero(), 0.0};
-}
-
-bool Fusion::alive_at(FusionChannel c, int64_t t_us) const {
-  return memory(c).alive_us && seconds_between(*memory(c).alive_us, t_us) < timeout(c);
-}
-
-void Fusion::set_gnss(int64_t t_us, bool present) {
-  if (gnss_ && !present) refuse_fix(comeback_);
-  gnss_ = present;
-  ::roadfix::set_gnss(ramp_, config_.adaptive, t_us, present);
-}
+void Fusion::set_gnss(int64_t t_us, bool present) { failover_.set_gnss(t_us, present); }
 
 void Fusion::set_ins_gyro(const Eigen::Vector3d& bias_std, const YawPitchRoll& mounting) {
   const Eigen::RowVector3d up = quaternion(mounting).toRotationMatrix().row(2);
-  ins_drift_std_ = up.cwiseProduct(bias_std.transpose()).norm();
+  at(FusionChannel::kIns).set_drift(up.cwiseProduct(bias_std.transpose()).norm());
 }
 
 FuseStatus Fusion::add(const ChannelSample& s) {
-  FusionChannelReport& report = reports_[static_cast<std::size_t>(s.channel)];
-  report.nis = 0.0;
-  report.dof = 0;
-  report.gate = config_.gate;
-  const auto done = [&](FuseStatus status) { return report.status = status; };
-  if (!usable(s.odometry) || (s.passing && !usable(*s.passing))) return done(FuseStatus::kBadInput);
-  if (started_ && s.odometry.t_us < t_us_) return done(FuseStatus::kNotReady);
-  const bool good = s.odometry.validity != Validity::kInvalid;
-  if (s.channel == FusionChannel::kWheel && good && alive_at(FusionChannel::kIns, s.odometry.t_us)) {
-    // Wheels and imu are in the INS already. Not even a step is split for them.
-    memory(s.channel).last.reset();
-    memory(s.channel).alive_us = report.last_us = s.odometry.t_us;
-    report.status = FuseStatus::kDisabled;
-    weigh(s.channel, 0.0);
-    return report.status;
+  const auto refused = [&](FuseStatus status) {
+    record(s.channel, status);
+    return status;
+  };
+  // Vision comes later than the others; what it says of the past still counts.
+  const double late = s.channel == FusionChannel::kVo ? kLatestPicture : 0.0;
+  if (started_ && seconds_between(s.odometry.t_us, t_us_) > late) return refused(FuseStatus::kNotReady);
+  const FuseStatus status = at(s.channel).add(s);
+  if (status == FuseStatus::kBadInput || status == FuseStatus::kNotReady) return refused(status);
+  if (!started_ && status == FuseStatus::kBadQuality) return refused(status);
+  const double dt = started_ ? std::max(0.0, seconds_between(t_us_, s.odometry.t_us)) : 0.0;
+  t_us_ = started_ ? std::max(t_us_, s.odometry.t_us) : s.odometry.t_us;
+  if (!started_) {
+    local_.start(t_us_);
+    failover_.start(local_.pose());
+    started_ = true;
   }
-  if (!started_ && !good) return done(FuseStatus::kBadQuality);
-  if (!started_) start(s);
-
-  const Before before{now_, seconds_between(t_us_, s.odometry.t_us), combined_variance(imm_, kSpeed)};
-  const bool motion_of_ins = s.channel == FusionChannel::kIns && good && memory(s.channel).last;
-  advance(s.odometry.t_us, motion_of_ins);
-  if (!good) {
-    now_ = combine_planar(imm_);
-    follow_local(before, now_, false);
-    memory(s.channel).last.reset();
-    if (s.channel == FusionChannel::kVo) ask_restart("vision says that it is lost");
-    return done(FuseStatus::kBadQuality);
-  }
-  memory(s.channel).alive_us = report.last_us = t_us_;
-  const double known = place_variance(imm_);
-  const LevelView view = level_view(s.odometry);
-  const FuseStatus status = fuse(s, view, before, report);
-  if (s.channel == FusionChannel::kVo) {
-    now_ = combine_planar(imm_);
-    update_tie(s);
-  }
-  remember(s, view);
-  reweigh(imm_);
-  now_ = combine_planar(imm_);
-  report.status = status;
-  weigh(s.channel, std::max(0.0, known / now_.planar.P.topLeftCorner<2, 2>().trace() - 1.0));
+  watch_frozen();
+  const bool fresh = status != FuseStatus::kBadQuality;
+  local_.add(s.channel, fresh, channels_, t_us_);
+  failover_.add(s.channel, fresh, channels_, local_, t_us_);
+  epoch(s);
+  if (s.channel == FusionChannel::kVo) watch_vision(s);
+  settle_validity(dt);
+  record(s.channel, status);
   return status;
 }
 
-FuseStatus Fusion::fuse(const ChannelSample& s, const LevelView& view, const Before& before,
-                        FusionChannelReport& report) {
-  const bool ins = s.channel == FusionChannel::kIns;
-  const bool placing = ins && !placed_;
-  if (placing || config_.scheme == FusionScheme::kLiteral) {
-    follow_local(before, combine_planar(imm_), true);
-    if (!placing) return fuse_literal(s, report);
-    place(s.odometry);
-    return FuseStatus::kAccepted;
-  }
-  move_height(s, view);
-  const FuseStatus status = fuse_motion(s, view, report);
-  fuse_rates(s, view, !ins && status == FuseStatus::kAccepted);
-  const PlanarMixture after = combine_planar(imm_);
-  follow_local(before, after, ins || status == FuseStatus::kAccepted);
-  return ins ? fuse_gain(s, view, after.planar, report) : status;
+/// Compares at a picture's time, for pictures come seldom; without vision, when it is due.
+void Fusion::epoch(const ChannelSample& s) {
+  const bool picture = s.channel == FusionChannel::kVo && channel(FusionChannel::kVo).alive(t_us_);
+  const double due = Witnesses::kSpacing + (picture ? -0.01 : kLatestEpoch);
+  const int64_t at_us = picture ? s.odometry.t_us : t_us_;
+  if (witnesses_.last_us() && seconds_between(*witnesses_.last_us(), at_us) < due) return;
+  witnesses_.add(epoch_at(at_us), channels_);
+  judge();
+  calibrate();
+  weigh();
 }
 
-/// The first sample: position, yaw and speed as it says; a channel without enu gives a local frame only.
-void Fusion::start(const ChannelSample& s) {
-  t_us_ = height_us_ = s.odometry.t_us;
-  attitude_ = s.odometry;
-  FusionEstimate e;
-  const bool enu = s.channel == FusionChannel::kIns;
-  if (enu) {
-    e.x.segment<3>(kPos) = planar_pose(s.odometry);
-    e.P.block<3, 3>(kPos, kPos) = planar_covariance(s.odometry);
-    height_ = s.odometry.T_frame_vehicle.p.z();
-    height_variance_ = s.odometry.cov_pose(2, 2);
-  } else {
-    for (int i = 0; i < 2; ++i) set_independent(e, kPos + i, 0.0, kUnknownPosition);
-    set_independent(e, kYaw, 0.0, kUnknownPosition);
-    height_ = 0.0;
-    height_variance_ = kUnknownPosition * kUnknownPosition;
+Epoch Fusion::epoch_at(int64_t at_us) const {
+  Epoch e;
+  e.t_us = at_us;
+  for (const FusionChannel c : kAll) {
+    const PoseChannel& channel = this->channel(c);
+    Witness& w = e.channels[static_cast<std::size_t>(c)];
+    w.comparable = channel.moves(t_us_);
+    if (!w.comparable) continue;
+    w.segment = channel.segment();
+    w.track = channel.track(at_us);
+    if (c != FusionChannel::kIns) continue;
+    w.track = channel.pose(at_us);
+    w.P = channel.view().P;
+    w.velocity_variance = 0.5 * channel.odometry().cov_velocity.topLeftCorner<2, 2>().trace();
+    w.drift_variance = channel.drift() * channel.drift();
   }
-  set_independent(e, kSpeed, s.odometry.velocity.x(), kUnknownSpeed);
-  set_independent(e, kAccel, 0.0, 2.0);
-  set_independent(e, kTurn, s.odometry.angular_rate.z(), 0.1);
-  set_independent(e, kVoScale, 0.0, config_.vo_scale_std);
-  set_independent(e, kVoTurns, 0.0, config_.vo_turns_std);
-  set_independent(e, kWheelScale, 0.0, config_.wheel_scale_std);
-  for (int i = 0; i < 2; ++i) set_independent(e, kInsVelocity + i, 0.0, std::sqrt(s.odometry.cov_velocity(0, 0)));
-  set_independent(e, kInsDrift, 0.0, ins_drift_std_);
-  // The speed is the channel's: with the error of its scale, or of its velocity, which the next samples have as well.
-  const double own = enu ? 0.0 : s.odometry.cov_velocity(0, 0);
-  if (s.metric)
-    finish_update(e, begin_update(e, told_speed(e.x, slots(s.channel), s.odometry.velocity.x(),
-                                                own + config_.speed_sigma * config_.speed_sigma)));
-  for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
-  for (Mode& mode : imm_.modes) mode.estimate = e;
-  now_ = combine_planar(imm_);
-  started_ = true;
-  placed_ = enu;
-  foreign_ = !enu;
+  return e;
 }
 
-/// The first enu pose of a fusion that runs in a local frame: position and yaw are taken over, what was learnt stays.
-void Fusion::place(const Odometry& o) {
-  for (Mode& mode : imm_.modes) {
-    FusionEstimate& e = mode.estimate;
-    set_cloned(e, true);
-    for (int i = 0; i < 3; ++i) set_independent(e, kPos + i, planar_pose(o)(i), 1.0);
-    e.P.block<3, 3>(kPos, kPos) = planar_covariance(o);
-    for (const int clone : {int{kInsClone}, int{kVoClone}}) clone_pose(e, clone);
-  }
-  for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) memory(c).last.reset();
-  height_ = o.T_frame_vehicle.p.z();
-  height_variance_ = o.cov_pose(2, 2);
-  height_us_ = t_us_;
-  tie_.forget();
-  comeback_.residual.setZero();  // no pose in enu was told yet that could jump
-  comeback_.height = 0.0;
-  placed_ = true;
-  foreign_ = false;
+/// Who contradicts whom: an INS that two witnesses contradict which agree is wrong; a witness is, that the INS or the
+/// wheels contradict. Wheels before vision: Ock et al. (2020), (15).
+void Fusion::judge() {
+  using enum FusionChannel;
+  const auto contradict = [&](FusionChannel a, FusionChannel b) {
+    return witnesses_.agreement(a, b) == WitnessAgreement::kContradict;
+  };
+  const auto fits = [&](FusionChannel a, FusionChannel b) {
+    const auto& c = witnesses_.comparison(a, b);
+    return c.done && c.fits && !contradict(a, b);
+  };
+  const bool witnesses_count = !channel(kVo).on_trial() && !channel(kWheel).on_trial();
+  const bool agree = witnesses_.agreement(kVo, kWheel) == WitnessAgreement::kAgree;
+  const bool ins_bad = witnesses_count && contradict(kIns, kVo) && contradict(kIns, kWheel) && agree;
+  const bool wheel_bad = contradict(kIns, kWheel) && !ins_bad;
+  const bool vo_bad = (contradict(kIns, kVo) && !ins_bad) || (contradict(kVo, kWheel) && !wheel_bad);
+  const auto alone = [&](FusionChannel c) {
+    return std::none_of(std::begin(kAll), std::end(kAll),
+                        [&](FusionChannel o) { return o != c && channel(o).good(t_us_); });
+  };
+  const bool vo_fits = fits(kIns, kVo) || fits(kVo, kWheel) || alone(kVo);
+  const bool wheel_fits = fits(kIns, kWheel) || fits(kVo, kWheel) || alone(kWheel);
+  at(kIns).judge(ins_bad, true);
+  at(kVo).judge(vo_bad, vo_fits);
+  at(kWheel).judge(wheel_bad, wheel_fits);
+  failover_.judge(ins_bad, !contradict(kIns, kVo) && !contradict(kIns, kWheel), channels_, t_us_);
 }
 
-/// Mixing and prediction to t_us, in steps that the models are good for. Where the INS's motion comes next, its clone
-/// may be the pose that the one step began at; otherwise it needs rows of its own.
-void Fusion::advance(int64_t t_us, bool motion_of_ins) {
-  const double total = seconds_between(t_us_, t_us);
-  if (total <= 0.0) {
-    for (Mode& mode : imm_.modes) {
-      set_cloned(mode.estimate, true);
-      mode.log_likelihood = 0.0;
+/// While fixes hold the INS's pose, it shows what the others' motions have wrong all along, and how noisy they are. Without
+/// it vision, whose yaw does not drift, shows what turns the wheels.
+void Fusion::calibrate() {
+  const double window = Witnesses::kCalibration * Witnesses::kSpacing;
+  if (epochs_ % Witnesses::kShort == 1) {  // each shows what of their difference the other does not explain
+    adapt(FusionChannel::kVo, FusionChannel::kWheel);
+    adapt(FusionChannel::kWheel, FusionChannel::kVo);
+  }
+  const bool held = failover_.follows() && failover_.gnss_for(t_us_) >= window;
+  const bool learns = ++epochs_ >= Witnesses::kCalibration;
+  if (learns) epochs_ = 0;
+  if (held) {
+    for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) {
+      if (learns) learn(c);
+      if (epochs_ % Witnesses::kShort == 0) adapt(c, FusionChannel::kIns);
     }
+  } else if (learns && !channel(FusionChannel::kIns).alive(t_us_)) {
+    learn_turns();
+  }
+}
+
+void Fusion::learn(FusionChannel c) {
+  const auto ins = witnesses_.window(FusionChannel::kIns, Witnesses::kCalibration, channels_);
+  const auto own = witnesses_.window(c, Witnesses::kCalibration, channels_);
+  if (!ins || !own || ins->motion.head<2>().norm() < kLeastWay) return;
+  ChannelCalibration& calibration = at(c).calibration();
+  if (calibration.covariance()(kScale, kScale) > kRawScale * kRawScale) {
+    const double ratio = own->motion.head<2>().norm() / ins->motion.head<2>().norm();
+    if (ratio > 0.0) calibration.set_scale(calibration.mean()(kScale) + std::log(ratio), 0.1);
     return;
   }
-  const int steps = std::min(100, 1 + static_cast<int>(total / kLongestStep));
-  const double dt = total / steps;
-  if (!motion_of_ins || steps > 1)
-    for (Mode& mode : imm_.modes) set_cloned(mode.estimate, true);
-  const bool cloned = imm_.modes[0].estimate.cloned;
-  const Eigen::Matrix2d transition = mode_transition(dt, {config_.straight_duration, config_.turn_duration});
-  for (int i = 0; i < steps; ++i) {
-    mix(imm_, transition);
-    predict(imm_, config_.motion, dt, cloned ? nullptr : &begun_);
+  if (witnesses_.agreement(FusionChannel::kIns, c) != WitnessAgreement::kContradict)
+    calibration.learn(sum_of(*own), ins->motion, ins->S);
+}
+
+void Fusion::learn_turns() {
+  const auto vision = witnesses_.window(FusionChannel::kVo, Witnesses::kCalibration, channels_);
+  const auto wheels = witnesses_.window(FusionChannel::kWheel, Witnesses::kCalibration, channels_);
+  const bool agree = witnesses_.agreement(FusionChannel::kVo, FusionChannel::kWheel) == WitnessAgreement::kAgree;
+  if (!vision || !wheels || !agree || vision->motion.head<2>().norm() < kLeastWay) return;
+  at(FusionChannel::kWheel).calibration().learn_turns(sum_of(*wheels), vision->motion, vision->S);
+}
+
+void Fusion::adapt(FusionChannel c, FusionChannel reference) {
+  const auto other = witnesses_.window(reference, Witnesses::kShort, channels_);
+  const auto own = witnesses_.window(c, Witnesses::kShort, channels_);
+  if (!other || !own || witnesses_.agreement(reference, c) != WitnessAgreement::kAgree) return;
+  at(c).adapt(difference_of(other->motion, own->motion), own->motion, own->dt, other->S + own->S - own->noise);
+}
+
+/// A pose that is repeated although its own velocity, or another channel, says that the vehicle moves.
+void Fusion::watch_frozen() {
+  for (const FusionChannel c : kAll) {
+    PoseChannel& own = at(c);
+    if (!own.alive(t_us_)) continue;
+    bool moves = own.odometry().velocity.norm() > kMoves;
+    for (const FusionChannel other : kAll)
+      moves = moves || (other != c && channel(other).good(t_us_) && std::abs(channel(other).speed()) > kMoves);
+    own.set_frozen(moves && own.repeated(t_us_) > kRepeated);
   }
-  let_return(comeback_, config_.comeback, total);
-  doubt_ *= std::exp(-total / std::max(kShortestDoubt, config_.refusal_timeout));
-  t_us_ = t_us;
+}
+
+/// Keeps the tie between vision and POSE_LOCAL while they agree; asks the vision to start again where it is lost or
+/// wrong and somebody else knows where it should.
+void Fusion::watch_vision(const ChannelSample& s) {
+  const PoseChannel& vision = channel(FusionChannel::kVo);
+  const ChannelState state = vision.state(t_us_);
+  const bool bad =
+      state == ChannelState::kInvalid || state == ChannelState::kContradicted || state == ChannelState::kFrozen;
+  if (!bad) {
+    vision_bad_since_us_.reset();
+    const bool doubted =
+        witnesses_.agreement(FusionChannel::kVo, FusionChannel::kWheel) == WitnessAgreement::kContradict;
+    if (state == ChannelState::kGood && !doubted && witnesses_.last_us() == s.odometry.t_us)
+      restart_.tie(s.odometry.T_frame_vehicle, local_at(s.odometry.t_us));
+    return;
+  }
+  if (!vision_bad_since_us_) vision_bad_since_us_ = t_us_;
+  const auto witness = local_.leader();
+  if (!witness || witness == FusionChannel::kVo || seconds_between(*vision_bad_since_us_, t_us_) < kRestartAfter)
+    return;
+  restart_.ask(t_us_, config_.restart_every,
+               state == ChannelState::kInvalid ? "vision says that it is lost" : "vision contradicts");
+}
+
+void Fusion::record(FusionChannel c, FuseStatus status) {
+  FusionChannelReport& r = reports_[static_cast<std::size_t>(c)];
+  r.status = status;
+  if (status == FuseStatus::kAccepted && channel(c).state(t_us_) == ChannelState::kContradicted)
+    r.status = FuseStatus::kGated;
+  r.nis = 0.0;
+  r.dof = 0;
+  for (const FusionChannel other : kAll) {
+    if (other == c || r.dof > 0) continue;
+    const Witnesses::Comparison& compared = witnesses_.comparison(c, other);
+    if (!compared.done) continue;
+    r.nis = compared.nis;
+    r.dof = 3;
+    r.innovation = compared.difference;
+    r.innovation_variance = compared.S.diagonal();
+  }
+}
+
+/// Shares of the reliability: the inverse of the expected error of a motion over 10 s.
+void Fusion::weigh() {
+  double sum = 0.0;
+  for (const FusionChannel c : kAll) {
+    const bool counts = channel(c).good(t_us_);
+    const double weight = counts ? 1.0 / channel(c).expected_error(channel(c).speed()) : 0.0;
+    reports_[static_cast<std::size_t>(c)].weight = weight;
+    sum += weight;
+  }
+  for (FusionChannelReport& r : reports_) r.weight = sum > 0.0 ? r.weight / sum : 0.0;
+}
+
+VisionRestart Fusion::take_restart(const Odometry& local) {
+  return restart_.take(local, channel(FusionChannel::kVo).calibration().length());
+}
+
+void Fusion::save(StateWriter& writer) const {
+  for (const PoseChannel& c : channels_) c.save(writer);
+  witnesses_.save(writer);
+  local_.save(writer);
+  failover_.save(writer);
+  restart_.save(writer);
+  jumps_.save(writer);
+  const auto put = [&](const auto&... members) { (write(writer, members), ...); };
+  for (const FusionChannelReport& r : reports_)
+    put(r.status, r.nis, r.dof, r.innovation, r.innovation_variance, r.weight);
+  put(t_us_, started_, epochs_, validity_, better_for_, vision_bad_since_us_);
+}
+
+void Fusion::load(StateReader& reader) {
+  for (PoseChannel& c : channels_) c.load(reader);
+  witnesses_.load(reader);
+  local_.load(reader);
+  failover_.load(reader);
+  restart_.load(reader);
+  jumps_.load(reader);
+  const auto get = [&](auto&... members) { (read(reader, members), ...); };
+  for (FusionChannelReport& r : reports_) get(r.status, r.nis, r.dof, r.innovation, r.innovation_variance, r.weight);
+  get(t_us_, started_, epochs_, validity_, better_for_, vision_bad_since_us_);
 }
 
 }  // namespace roadfix

@@ -1,92 +1,92 @@
 /// Tuning of the fusion; one set for all vehicles. Keys and ranges in visit().
 #pragma once
 
-#include "fusion/adaptive_covariance.h"
-#include "fusion/arbitration.h"
-#include "fusion/frame_tie.h"
-#include "fusion/motion_model.h"
-#include "fusion/return_limiter.h"
+#include "fusion/channel_calibration.h"
+#include "fusion/imm.h"
 
 namespace roadfix {
 
-/// kLiteral: Lee et al. (2025), each pose an independent absolute measurement. kRelative: motion since the last use, and of
-/// absolute poses only what they gained (MODEL.md, section 4).
-enum class FusionScheme { kRelative, kLiteral };
-
-/// Least uncertainty of one channel's motion.
-struct MotionFloor {
-  double position = 0.01;  ///< m per sqrt(s)
-  double share = 0.0;      ///< of the way between two uses, along it
-  double across = 0.0;     ///< the same across it
-  double yaw = 2e-4;       ///< rad per sqrt(s)
+/// Errors of a channel's motion that are new from step to step, and of one pose.
+struct ChannelNoise {
+  double place = 0.01;       ///< m per sqrt(s)
+  double yaw = 1e-4;         ///< rad per sqrt(s)
+  double jitter = 0.005;     ///< m, of one pose, which the next does not share
+  double yaw_jitter = 1e-3;  ///< rad, likewise
+  double velocity = 0.05;    ///< m/s, white, where a motion is led by velocities
+  double timeout = 0.3;      ///< s without a valid sample: the channel is silent
+  double correlation = 5.0;  ///< s, for which a filter's velocity error lasts
+  CalibrationNoise calibration;
 };
 
 template <class Visitor>
-void visit(MotionFloor& c, Visitor& v) {
-  v.number("position_m_per_rts", c.position, 1e-6, 100.0);
-  v.number("share", c.share, 0.0, 1.0);
-  v.number("share_across", c.across, 0.0, 1.0);
+void visit(ChannelNoise& c, Visitor& v) {
+  v.number("place_m_per_rts", c.place, 1e-6, 100.0);
   v.number("yaw_rad_per_rts", c.yaw, 1e-7, 1.0);
+  v.number("jitter_m", c.jitter, 0.0, 10.0);
+  v.number("yaw_jitter_rad", c.yaw_jitter, 0.0, 1.0);
+  v.number("velocity_mps", c.velocity, 1e-4, 10.0);
+  v.number("timeout_s", c.timeout, 0.01, 60.0);
+  v.number("correlation_s", c.correlation, 0.0, 1e4);
+  v.group("calibration", c.calibration);
+}
+
+/// Comparison of two channels' motions over a window, with hysteresis. Squared Mahalanobis distances of 3 degrees of
+/// freedom: 99.9 % and 95 %.
+struct AgreementConfig {
+  double gate = 16.3;
+  int bad_after = 4;     ///< comparisons beyond the gate in a row: they contradict
+  double clear = 7.8;    ///< and below this ...
+  int good_after = 4;    ///< ... that many times in a row: they agree again
+  double gross = 163.0;  ///< a single comparison beyond this is enough
+};
+
+template <class Visitor>
+void visit(AgreementConfig& c, Visitor& v) {
+  v.number("gate", c.gate, 0.1, 1e6);
+  v.integer("bad_after", c.bad_after, 1, 10000);
+  v.number("clear", c.clear, 0.01, 1e6);
+  v.integer("good_after", c.good_after, 1, 10000);
+  v.number("gross", c.gross, 0.1, 1e9);
 }
 
 struct FusionConfig {
-  FusionScheme scheme = FusionScheme::kRelative;
   MotionNoise motion;
-  double straight_duration = 10.0;  ///< s, mean duration of the mode
-  double turn_duration = 4.0;       ///< s
-  double turn_sigma = 0.01;         ///< rad/s, of a yaw rate as it is measured
-  double speed_sigma = 0.05;        ///< m/s, white error of a speed, beside what the channel says of it
-  MotionFloor ins_floor{0.002, 0.0, 0.0, 2e-5};
-  MotionFloor vo_floor{0.005, 0.005, 0.002, 6e-5};  ///< stereo sees the way less sharply than its direction
-  MotionFloor wheel_floor{0.01, 0.003, 0.003, 5e-4};
-  double vo_jitter = 0.005;     ///< m, error of one picture's place that the next ones do not have, of a vision that
-                                ///< does not tell it
-  double vo_yaw_jitter = 1e-3;  ///< rad, likewise
-  double vo_scale_std = 0.03;   ///< before GNSS has shown it
-  double vo_turns_std = 0.003;  ///< share of its turns: the focal length (slam's M.22), a gyro's scale
-  double wheel_scale_std = 0.01;
-  double least_gain = 0.01;       ///< share of variance that an absolute pose must take away to be used
-  double gate = 16.3;             ///< squared Mahalanobis distance, 99.9 % of 3 degrees of freedom
-  double refusal_timeout = 10.0;  ///< s of refused absolute poses after which they are right
-  double ins_timeout = 0.3;       ///< s without a sample: the channel is dead
-  double vo_timeout = 0.6;        ///< s
-  double wheel_timeout = 0.3;     ///< s
-  double jump_tolerance = 0.05;   ///< m between pose difference and velocity: the estimator corrected itself
-  double restart_every = 5.0;     ///< s between requests to restart the vision
-  AdaptiveConfig adaptive;
+  ModeDurations durations;
+  double turn_sigma = 0.01;   ///< rad/s, of a yaw rate as it is measured
+  double speed_sigma = 0.05;  ///< m/s, likewise
+  ChannelNoise ins{0.002, 2e-5, 0.0, 0.0, 0.02, 0.3, 5.0, {}};
+  // Stereo or wheels give vision its lengths; nothing in a picture knows time, so that its yaw has no drift.
+  ChannelNoise vo{0.01, 1e-4, 0.005, 5e-4, 0.15, 0.6, 0.0, {0.01, 2e-3, 3e-3, 1e-6, 0.1, 3e-5, 1e-5, 0.0}};
+  ChannelNoise wheel{0.01, 2e-4, 0.005, 1e-4, 0.05, 0.3, 0.0, {0.01, 2e-3, 1e-3, 5e-4, 0.5, 2e-5, 1e-5, 2e-6}};
   AgreementConfig agreement;
-  TieNoise tie;
-  ReturnConfig comeback;
+  double jump = 1.5;             ///< m by which an INS may correct itself without a fix
+  double announced = 0.3;        ///< m: steps of POSE_FUSED beyond it count as resets
+  double refusal_timeout = 3.0;  ///< s of fixes without a contradiction, after one, until the INS is right
+  double readmission = 0.5;      ///< s that an INS must be healthy before it is followed again
+  double valid_after = 0.5;      ///< s, for which a better validity must hold before it is published
+  double lost_sigma = 50.0;      ///< m, horizontal: the pose is invalid
+  double unled = 2.0;            ///< s without any channel's motion: the pose is invalid
+  double restart_every = 5.0;    ///< s between requests to restart the vision
 };
 
 template <class Visitor>
 void visit(FusionConfig& c, Visitor& v) {
-  v.choice("scheme", c.scheme, {{"relative", FusionScheme::kRelative}, {"literal", FusionScheme::kLiteral}});
   v.group("motion", c.motion);
-  v.number("straight_duration_s", c.straight_duration, 0.01, 1e4);
-  v.number("turn_duration_s", c.turn_duration, 0.01, 1e4);
+  v.group("durations", c.durations);
   v.number("turn_sigma_radps", c.turn_sigma, 1e-5, 1.0);
   v.number("speed_sigma_mps", c.speed_sigma, 1e-4, 10.0);
-  v.group("ins_floor", c.ins_floor);
-  v.group("vo_floor", c.vo_floor);
-  v.group("wheel_floor", c.wheel_floor);
-  v.number("vo_jitter_m", c.vo_jitter, 0.0, 10.0);
-  v.number("vo_yaw_jitter_rad", c.vo_yaw_jitter, 0.0, 1.0);
-  v.number("vo_scale_std", c.vo_scale_std, 0.0, 1.0);
-  v.number("vo_turns_std", c.vo_turns_std, 0.0, 1.0);
-  v.number("wheel_scale_std", c.wheel_scale_std, 0.0, 1.0);
-  v.number("least_gain", c.least_gain, 0.001, 0.999);
-  v.number("gate", c.gate, 0.1, 1e9);
-  v.number("refusal_timeout_s", c.refusal_timeout, 0.0, 1e6);
-  v.number("ins_timeout_s", c.ins_timeout, 0.01, 60.0);
-  v.number("vo_timeout_s", c.vo_timeout, 0.01, 60.0);
-  v.number("wheel_timeout_s", c.wheel_timeout, 0.01, 60.0);
-  v.number("jump_tolerance_m", c.jump_tolerance, 1e-4, 100.0);
-  v.number("restart_every_s", c.restart_every, 0.0, 1e4);
-  v.group("adaptive", c.adaptive);
+  v.group("ins", c.ins);
+  v.group("vo", c.vo);
+  v.group("wheel", c.wheel);
   v.group("agreement", c.agreement);
-  v.group("tie", c.tie);
-  v.group("return", c.comeback);
+  v.number("jump_m", c.jump, 0.0, 1e6);
+  v.number("announced_m", c.announced, 0.0, 1e6);
+  v.number("refusal_timeout_s", c.refusal_timeout, 0.0, 1e6);
+  v.number("readmission_s", c.readmission, 0.0, 1e4);
+  v.number("valid_after_s", c.valid_after, 0.0, 1e4);
+  v.number("lost_sigma_m", c.lost_sigma, 0.01, 1e6);
+  v.number("unled_s", c.unled, 0.0, 1e4);
+  v.number("restart_every_s", c.restart_every, 0.0, 1e4);
 }
 
 }  // namespace roadfix

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/frames.h"
 #include "geometry/so3.h"
 
 namespace roadfix {
@@ -11,14 +12,37 @@ using namespace fusion;
 
 namespace {
 
-/// Of the mixture of a and b = a + d, weight w on b, what the difference d adds to the covariance.
-double spread(double w) { return (1.0 - w) * w; }
+constexpr double kLongestStep = 0.1;  ///< s, of the motion models
+
+/// Moves `from` by share w of the way to `to`: mean and covariance of the mixture of both, weight w on `to`.
+FusionEstimate mixture(const FusionEstimate& from, const FusionEstimate& to, double w) {
+  const Vector d = difference(to.x, from.x);
+  // Differences are taken from the first one, so that equal modes keep their bits.
+  return {plus(from.x, w * d), from.P + w * (to.P - from.P) + (1.0 - w) * w * d * d.transpose()};
+}
+
+/// Kalman update of one mode, with the likelihood of the innovation.
+template <int M>
+void update(Mode& mode, const Eigen::Matrix<double, M, kSize>& H, const Eigen::Matrix<double, M, 1>& innovation,
+            const Eigen::Matrix<double, M, M>& R) {
+  FusionEstimate& e = mode.estimate;
+  const Eigen::Matrix<double, kSize, M> PHt = e.P * H.transpose();
+  const Eigen::Matrix<double, M, M> S = H * PHt + R;
+  const Eigen::LLT<Eigen::Matrix<double, M, M>> llt(S);
+  if (llt.info() != Eigen::Success) return;
+  const Eigen::Matrix<double, M, 1> weighted = llt.solve(innovation);
+  const Eigen::Matrix<double, M, M> L = llt.matrixL();
+  mode.log_likelihood -= 0.5 * (innovation.dot(weighted) + M * std::log(2.0 * kPi)) + L.diagonal().array().log().sum();
+  e.x = plus(e.x, PHt * weighted);
+  e.P -= PHt * llt.solve(PHt.transpose());
+  e.P = (0.5 * (e.P + e.P.transpose())).eval();
+}
 
 }  // namespace
 
-Eigen::Matrix2d mode_transition(double dt, const Eigen::Vector2d& mean_duration) {
-  const double leave0 = 1.0 - std::exp(-dt / mean_duration(0));
-  const double leave1 = 1.0 - std::exp(-dt / mean_duration(1));
+Eigen::Matrix2d mode_transition(double dt, const ModeDurations& durations) {
+  const double leave0 = 1.0 - std::exp(-dt / durations.straight);
+  const double leave1 = 1.0 - std::exp(-dt / durations.turn);
   Eigen::Matrix2d T;
   T << 1.0 - leave0, leave0, leave1, 1.0 - leave1;
   return T;
@@ -26,37 +50,31 @@ Eigen::Matrix2d mode_transition(double dt, const Eigen::Vector2d& mean_duration)
 
 void mix(Imm& imm, const Eigen::Matrix2d& transition) {
   const Eigen::Vector2d predicted = transition.transpose() * imm.probability;
-  FusionEstimate& a = imm.modes[0].estimate;
-  FusionEstimate& b = imm.modes[1].estimate;
-  const Vector d = difference(b.x, a.x);
   // P(was the second | is j); a mode that cannot be reached keeps its own estimate.
-  const auto from_b = [&](int j) {
+  const auto from_second = [&](int j) {
     return predicted(j) > 0.0 ? transition(1, j) * imm.probability(1) / predicted(j) : static_cast<double>(j);
   };
-  const double w_a = from_b(0), w_b = from_b(1);
-  // Differences are taken from the first mode, so that equal modes keep their bits.
-  with_size(a, [&](auto rows, auto columns) {
-    const Register* apart_x = registers(d.data());
-    for (int j = 0; j < columns; ++j) {
-      Register *in_a = column(a.P, j), *in_b = column(b.P, j);
-      const double of_a = spread(w_a) * d(j), of_b = spread(w_b) * d(j);
-      each_register<rows>([&](int i) {
-        const Register first = in_a[i], apart = in_b[i] - first;
-        in_a[i] = first + w_a * apart + of_a * apart_x[i];
-        in_b[i] = first + w_b * apart + of_b * apart_x[i];
-      });
-    }
-  });
-  b.x = plus(a.x, w_b * d);
-  a.x = plus(a.x, w_a * d);
+  const FusionEstimate a = imm.modes[0].estimate, b = imm.modes[1].estimate;
+  imm.modes[0].estimate = mixture(a, b, from_second(0));
+  imm.modes[1].estimate = mixture(a, b, from_second(1));
   for (Mode& mode : imm.modes) mode.log_likelihood = 0.0;
   imm.probability = predicted;
 }
 
-void predict(Imm& imm, const MotionNoise& noise, double dt, PosesBefore* before) {
-  for (std::size_t i = 0; i < kModes; ++i) {
-    Mode& mode = imm.modes[i];
-    move(mode.estimate, mode.kind, noise, dt, before != nullptr ? &(*before)[i] : nullptr);
+void predict(Imm& imm, const MotionNoise& noise, double dt) {
+  for (Mode& mode : imm.modes) move(mode.estimate, mode.kind, noise, dt);
+}
+
+void advance(Imm& imm, const ModeDurations& durations, const MotionNoise& noise, double dt) {
+  if (dt <= 0.0) {
+    for (Mode& mode : imm.modes) mode.log_likelihood = 0.0;
+    return;
+  }
+  const int steps = std::min(100, 1 + static_cast<int>(dt / kLongestStep));
+  const Eigen::Matrix2d transition = mode_transition(dt / steps, durations);
+  for (int i = 0; i < steps; ++i) {
+    mix(imm, transition);
+    predict(imm, noise, dt / steps);
   }
 }
 
@@ -70,46 +88,33 @@ void reweigh(Imm& imm) {
   if (sum > 0.0) imm.probability = weighted / sum;
 }
 
-void combine(const Imm& imm, FusionEstimate& m) {
-  const FusionEstimate& a = imm.modes[0].estimate;
-  const FusionEstimate& b = imm.modes[1].estimate;
-  const Vector d = difference(b.x, a.x);
-  const double w = imm.probability(1);
-  set_cloned(m, a.cloned);
-  m.x = plus(a.x, w * d);
-  with_size(a, [&](auto rows, auto columns) {
-    const Register* apart_x = registers(d.data());
-    for (int j = 0; j < columns; ++j) {
-      const Register *in_a = column(a.P, j), *in_b = column(b.P, j);
-      Register* out = column(m.P, j);
-      const double of_x = spread(w) * d(j);
-      each_register<rows>([&](int i) { out[i] = in_a[i] + w * (in_b[i] - in_a[i]) + of_x * apart_x[i]; });
-    }
-  });
+FusionEstimate combine(const Imm& imm) {
+  return mixture(imm.modes[0].estimate, imm.modes[1].estimate, imm.probability(1));
 }
 
-PlanarMixture combine_planar(const Imm& imm) {
-  const FusionEstimate& a = imm.modes[0].estimate;
-  const FusionEstimate& b = imm.modes[1].estimate;
-  const double w = imm.probability(1);
-  const Planar d = difference_of(b.x.segment<3>(kPos), a.x.segment<3>(kPos));
-  const Eigen::Matrix3d P_a = a.P.block<3, 3>(kPos, kPos), P_b = b.P.block<3, 3>(kPos, kPos);
-  PlanarMixture m;
-  m.planar.pose = a.x.segment<3>(kPos) + w * d;
-  m.planar.pose.z() = wrap_angle(m.planar.pose.z());
-  m.planar.P = P_a + w * (P_b - P_a) + spread(w) * (d * d.transpose());
-  m.speed = a.x(kSpeed) + w * (b.x(kSpeed) - a.x(kSpeed));
-  return m;
+PoseInnovation judge_pose(const FusionEstimate& e, const Planar& pose, const Eigen::Matrix3d& R) {
+  const Eigen::Matrix3d S = e.P.block<3, 3>(kPos, kPos) + R;
+  PoseInnovation j;
+  j.innovation = difference_of(pose, e.x.segment<3>(kPos));
+  j.variance = S.diagonal();
+  j.nis = j.innovation.dot(S.ldlt().solve(j.innovation));
+  return j;
 }
 
-double place_variance(const Imm& imm) { return combined_variance(imm, kPos) + combined_variance(imm, kPos + 1); }
+void update_pose(Imm& imm, const Planar& pose, const Eigen::Matrix3d& R) {
+  Eigen::Matrix<double, 3, kSize> H = Eigen::Matrix<double, 3, kSize>::Zero();
+  H.middleCols<3>(kPos).setIdentity();
+  for (Mode& mode : imm.modes) update<3>(mode, H, difference_of(pose, mode.estimate.x.segment<3>(kPos)), R);
+}
 
-double combined_variance(const Imm& imm, int i) {
-  const FusionEstimate& a = imm.modes[0].estimate;
-  const FusionEstimate& b = imm.modes[1].estimate;
-  const double w = imm.probability(1);
-  const double d = b.x(i) - a.x(i);
-  return a.P(i, i) + w * (b.P(i, i) - a.P(i, i)) + spread(w) * (d * d);
+void update_component(Imm& imm, int index, double value, double variance) {
+  Eigen::Matrix<double, 1, kSize> H = Eigen::Matrix<double, 1, kSize>::Zero();
+  H(0, index) = 1.0;
+  for (Mode& mode : imm.modes) {
+    double innovation = value - mode.estimate.x(index);
+    if (index == kYaw) innovation = wrap_angle(innovation);
+    update<1>(mode, H, Eigen::Matrix<double, 1, 1>(innovation), Eigen::Matrix<double, 1, 1>(variance));
+  }
 }
 
 }  // namespace roadfix

@@ -1,7 +1,7 @@
 /// The steps of an interacting multiple model filter, one free function each (Blom, Bar-Shalom, The interacting
 /// multiple model algorithm, 1988; Bar-Shalom, Li, Kirubarajan, Estimation with applications to tracking and
-/// navigation, 2001, section 11.6.6; Lee et al. (2025), section 3.2 and (7), (8)). Angles are mixed as angles; likelihoods stay
-/// logarithms.
+/// navigation, 2001, section 11.6.6; Lee et al. (2025), section 3.2 and (7), (8)). Angles are mixed as angles;
+/// likelihoods stay logarithms.
 ///
 /// In order: mix, predict, any number of updates (each adds to log_likelihood), reweigh, combine.
 #pragma once
@@ -27,37 +27,48 @@ struct Imm {
   Eigen::Vector2d probability = Eigen::Vector2d(0.5, 0.5);
 };
 
-/// Row i, column j: probability that mode i becomes mode j within dt, for the mean durations of the modes, s.
-Eigen::Matrix2d mode_transition(double dt, const Eigen::Vector2d& mean_duration);
+struct ModeDurations {
+  double straight = 10.0;  ///< s, mean duration
+  double turn = 4.0;       ///< s
+};
 
-/// Interaction: each mode starts from the mixture of all, weighted by who may have become it; probabilities are
-/// predicted. Log-likelihoods are zeroed.
+template <class Visitor>
+void visit(ModeDurations& c, Visitor& v) {
+  v.number("straight_s", c.straight, 0.01, 1e4);
+  v.number("turn_s", c.turn, 0.01, 1e4);
+}
+
+/// Row i, column j: probability that mode i becomes mode j within dt.
+Eigen::Matrix2d mode_transition(double dt, const ModeDurations& durations);
+
+/// Interaction: each mode starts from the mixture of all, weighted by who may have become it (F.2.6); probabilities
+/// are predicted. Log-likelihoods are zeroed.
 void mix(Imm& imm, const Eigen::Matrix2d& transition);
 
-/// Each mode by its own model. `before`: the poses that they moved from.
-using PosesBefore = std::array<PoseBefore, kModes>;
-void predict(Imm& imm, const MotionNoise& noise, double dt, PosesBefore* before = nullptr);
+/// Each mode by its own model.
+void predict(Imm& imm, const MotionNoise& noise, double dt);
 
-/// Probabilities by the likelihoods: log-sum-exp, so that they sum to one for likelihoods as small as they come.
+/// mix() and predict() over `dt`, in steps that the models are good for.
+void advance(Imm& imm, const ModeDurations& durations, const MotionNoise& noise, double dt);
+
+/// Probabilities by the likelihoods, (F.2.7): log-sum-exp, so that they sum to one for likelihoods as small as they
+/// come.
 void reweigh(Imm& imm);
 
 /// Moments of the mixture, Lee et al. (2025), (7), (8).
-void combine(const Imm& imm, FusionEstimate& combined);
-inline FusionEstimate combine(const Imm& imm) {
-  FusionEstimate combined;
-  combine(imm, combined);
-  return combined;
-}
+FusionEstimate combine(const Imm& imm);
 
-/// The same where the pose and the speed are all that is asked for.
-struct PlanarMixture {
-  PlanarEstimate planar;
-  double speed = 0.0;  ///< m/s
+/// What the modes' innovations were in the mean.
+struct PoseInnovation {
+  double nis = 0.0;
+  Eigen::Vector3d innovation = Eigen::Vector3d::Zero();
+  Eigen::Vector3d variance = Eigen::Vector3d::Zero();
 };
-PlanarMixture combine_planar(const Imm& imm);
-/// m2, east and north together.
-double place_variance(const Imm& imm);
-/// Of one state.
-double combined_variance(const Imm& imm, int index);
+/// The innovation of a pose against the combined estimate; nothing changes.
+PoseInnovation judge_pose(const FusionEstimate& e, const Planar& pose, const Eigen::Matrix3d& R);
+/// Lee et al. (2025), (5), (6): a pose as a pseudo-measurement of position and yaw.
+void update_pose(Imm& imm, const Planar& pose, const Eigen::Matrix3d& R);
+/// The same of one component.
+void update_component(Imm& imm, int index, double value, double variance);
 
 }  // namespace roadfix

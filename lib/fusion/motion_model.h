@@ -1,12 +1,38 @@
-/// The two motion models of Lee et al. (2025), constant acceleration (CA) and constant turn (CT); MODEL.md, section 3.
+/// The two motion models of Lee et al. (2025), constant acceleration (CA) and constant turn (CT); MODEL.md, section 2.
 ///
 /// Both let the speed change with the acceleration; they differ in the turn: CA drives straight on and draws a small
 /// yaw rate anew at each step, CT keeps its yaw rate and lets it wander.
 #pragma once
 
-#include "fusion/fusion_state.h"
+#include <Eigen/Dense>
 
 namespace roadfix {
+namespace fusion {
+
+enum Index {
+  kPos = 0,    ///< m, east and north, or x and y of a local frame
+  kYaw = 2,    ///< rad, counterclockwise from the first axis
+  kSpeed = 3,  ///< m/s, along the vehicle's x
+  kAccel = 4,  ///< m/s2
+  kTurn = 5,   ///< rad/s, yaw rate
+  kSize = 6
+};
+
+using Vector = Eigen::Matrix<double, kSize, 1>;
+using Matrix = Eigen::Matrix<double, kSize, kSize>;
+
+}  // namespace fusion
+
+/// Mean and covariance of one mode, or of all together. Angles are wrapped.
+struct FusionEstimate {
+  fusion::Vector x = fusion::Vector::Zero();
+  fusion::Matrix P = fusion::Matrix::Zero();
+};
+
+/// a - b with the yaws the short way round.
+fusion::Vector difference(const fusion::Vector& a, const fusion::Vector& b);
+/// x + d with the yaw in (-pi, pi].
+fusion::Vector plus(const fusion::Vector& x, const fusion::Vector& d);
 
 enum class MotionKind { kConstantAcceleration, kConstantTurn };
 
@@ -17,26 +43,7 @@ struct MotionNoise {
   double slip = 0.03;           ///< m/s, sideways, of a car that drives straight
   double slip_arm = 1.5;        ///< m: sideways speed per yaw rate, of an origin that is not at the rear axle
   double slip_time = 1.0;       ///< s, for which a slip lasts
-  double scale_walk = 2e-5;     ///< per sqrt(s), of the odometries' scales
 };
-
-/// Mean after dt; clones and parameters stay.
-fusion::Vector moved(const fusion::Vector& x, MotionKind kind, double dt);
-
-/// d moved / d x of the base states, (F.4).
-using BaseMatrix = Eigen::Matrix<double, fusion::kBase, fusion::kBase>;
-BaseMatrix moved_jacobian(const fusion::Vector& x, MotionKind kind, double dt);
-
-/// The pose before a move, as a clone would have kept it.
-struct PoseBefore {
-  Eigen::Vector3d pose = Eigen::Vector3d::Zero();
-  Eigen::Vector2d heading = Eigen::Vector2d::UnitX();  ///< cosine and sine of its yaw
-  Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, fusion::kSize, 3> with = Eigen::Matrix<double, fusion::kSize, 3>::Zero();  ///< cov(state, it)
-};
-
-/// Mean and covariance after dt, (F.5). `before`: what a clone of the pose would have been after it.
-void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt, PoseBefore* before = nullptr);
 
 template <class Visitor>
 void visit(MotionNoise& c, Visitor& v) {
@@ -46,7 +53,15 @@ void visit(MotionNoise& c, Visitor& v) {
   v.number("slip_mps", c.slip, 0.0, 100.0);
   v.number("slip_arm_m", c.slip_arm, 0.0, 100.0);
   v.number("slip_time_s", c.slip_time, 0.0, 100.0);
-  v.number("scale_walk_per_rts", c.scale_walk, 0.0, 0.1);
 }
+
+/// Mean after dt, (F.2.1) to (F.2.3).
+fusion::Vector moved(const fusion::Vector& x, MotionKind kind, double dt);
+
+/// d moved / d x, (F.2.4).
+fusion::Matrix moved_jacobian(const fusion::Vector& x, MotionKind kind, double dt);
+
+/// Mean and covariance after dt, (F.2.5).
+void move(FusionEstimate& e, MotionKind kind, const MotionNoise& noise, double dt);
 
 }  // namespace roadfix

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "fusion/fusion_state.h"
+#include "fusion/motion_model.h"
 #include "samples/samples.h"
 #include "stream/state_bytes.h"
 
@@ -30,14 +30,12 @@ void read(StateReader& r, std::optional<T>& value) {
 }
 
 inline void write(StateWriter& w, const FusionEstimate& e) {
-  w.put(States(e.x.head<kStates>()));
-  w.put(StatesCovariance(e.P.topLeftCorner<kStates, kStates>()));
-  w.put(e.cloned);
+  w.put(e.x);
+  w.put(e.P);
 }
 inline void read(StateReader& r, FusionEstimate& e) {
-  e.x.head<kStates>() = r.get<States>();
-  e.P.topLeftCorner<kStates, kStates>() = r.get<StatesCovariance>();
-  e.cloned = r.get<bool>();
+  r.get(e.x);
+  r.get(e.P);
 }
 
 /// `Pose` is Odometry or const Odometry.

@@ -55,7 +55,25 @@ void put(const Eigen::Quaterniond& q, double (&wxyz)[4]) {
   wxyz[3] = q.z();
 }
 
-void fill_modes(const Imm& imm, fusion_state_t& m) {
+int8_t health_code(ChannelState state) {
+  switch (state) {
+    case ChannelState::kSilent:
+      return fusion_state2_t::HEALTH_SILENT;
+    case ChannelState::kInvalid:
+      return fusion_state2_t::HEALTH_INVALID;
+    case ChannelState::kFrozen:
+      return fusion_state2_t::HEALTH_FROZEN;
+    case ChannelState::kOnTrial:
+      return fusion_state2_t::HEALTH_ON_TRIAL;
+    case ChannelState::kContradicted:
+      return fusion_state2_t::HEALTH_CONTRADICTED;
+    case ChannelState::kGood:
+      break;
+  }
+  return fusion_state2_t::HEALTH_GOOD;
+}
+
+void fill_modes(const Imm& imm, fusion_state2_t& m) {
   for (int i = 0; i < kModes; ++i) {
     const Mode& mode = imm.modes[static_cast<std::size_t>(i)];
     m.mode_name.emplace_back(mode.kind == MotionKind::kConstantTurn ? "constant_turn" : "constant_acceleration");
@@ -65,25 +83,58 @@ void fill_modes(const Imm& imm, fusion_state_t& m) {
   m.num_modes = kModes;
 }
 
-void fill_channels(const Fusion& fusion, fusion_state_t& m) {
+std::string contradicted_by(const Fusion& fusion, int channel) {
+  std::string names;
+  for (int other = 0; other < kFusionChannels; ++other) {
+    if (other == channel || fusion.agreement(static_cast<FusionChannel>(channel), static_cast<FusionChannel>(other)) !=
+                                WitnessAgreement::kContradict)
+      continue;
+    names += (names.empty() ? "" : " ") + std::string(kChannelNames[other]);
+  }
+  return names;
+}
+
+void fill_channels(const Fusion& fusion, fusion_state2_t& m) {
   for (int i = 0; i < kFusionChannels; ++i) {
-    const FusionChannelReport& report = fusion.channel(static_cast<FusionChannel>(i));
+    const auto c = static_cast<FusionChannel>(i);
+    const FusionChannelReport& report = fusion.channel_report(c);
+    const PoseChannel& channel = fusion.channel(c);
     m.channel_name.emplace_back(kChannelNames[i]);
     m.channel_status.push_back(status_code(report.status));
+    m.channel_health.push_back(health_code(channel.state(fusion.t_us())));
     m.channel_weight.push_back(report.weight);
-    m.channel_alpha.push_back(report.alpha);
+    m.channel_alpha.push_back(channel.noise_factors().x());
+    m.channel_yaw_alpha.push_back(channel.noise_factors().y());
     m.channel_nis.push_back(report.nis);
-    m.channel_gate.push_back(report.gate);
-    m.channel_age_s.push_back(report.last_us ? seconds_between(*report.last_us, fusion.t_us()) : kNeverAge);
+    m.channel_gate.push_back(fusion.config().agreement.gate);
+    m.channel_age_s.push_back(channel.last_us() ? seconds_between(*channel.last_us(), fusion.t_us()) : kNeverAge);
+    m.channel_scale.push_back(channel.calibration().length());
+    m.channel_scale_std.push_back(std::sqrt(channel.calibration().covariance()(kScale, kScale)));
+    m.channel_contradicts.push_back(contradicted_by(fusion, i));
   }
   m.num_channels = kFusionChannels;
 }
 
-void fill_tie(const Fusion& fusion, fusion_state_t& m) {
-  const FrameTie& tie = fusion.tie();
+void fill_source(const Fusion& fusion, fusion_state2_t& m) {
+  const Failover& failover = fusion.failover();
+  m.reason = fusion.reason();
+  if (fusion.t_us() == 0) return;
+  m.source = failover.follows() ? fusion_state2_t::SOURCE_INS : fusion_state2_t::SOURCE_CARRIED;
+  if (const auto leader = fusion.local_motion().leader()) m.leader = kChannelNames[static_cast<int>(*leader)];
+}
+
+void fill_literal(const LiteralFusion& literal, fusion_state2_t& m) {
+  m.source = fusion_state2_t::SOURCE_LITERAL;
+  for (std::size_t i = 0; i < kFusionChannels; ++i) {
+    const LiteralFusion::ChannelReport& report = literal.report(static_cast<FusionChannel>(i));
+    m.channel_status[i] = status_code(report.status);
+    m.channel_alpha[i] = report.alpha;
+    m.channel_yaw_alpha[i] = 1.0;
+    m.channel_nis[i] = report.innovation.nis;
+  }
+  const FrameTie& tie = literal.tie();
   m.tie_valid = tie.valid();
-  m.tie_frozen = fusion.tie_frozen();
-  m.tie_scale = 1.0;
+  m.tie_frozen = !literal.gnss();
   if (!tie.valid()) return;
   const FrameTie::Matrix5d& P = tie.covariance();
   m.tie_yaw_rad = tie.yaw();
@@ -102,32 +153,9 @@ ChannelSample channel_sample(FusionChannel channel, const pose_t& m, int64_t seq
   s.channel = channel;
   s.odometry = odometry(m);
   s.metric = m.scale == pose_t::SCALE_METRIC;
+  s.enu = channel == FusionChannel::kIns && m.frame == pose_t::FRAME_ENU;
   s.seq = seq;
   return s;
-}
-
-CommonError common_error(const vo_status_t& m) {
-  CommonError e;
-  if (m.mode != vo_status_t::MODE_KEYFRAME) return e;
-  e.scale_std = m.scale_std;
-  for (int i = 0; i < e.columns.rows(); ++i)
-    for (int j = 0; j < e.columns.cols(); ++j) e.columns(i, j) = m.shared_error_m_rad[j][i];
-  // One eye learns its focal length, exactly never: its zeros say that its map has not begun.
-  e.turns_exact = m.scale_source == vo_status_t::SCALE_FROM_STEREO && e.columns.col(1).isZero(0.0);
-  return e;
-}
-
-std::optional<PassingError> passing_error(const vo_status_t& m) {
-  if (m.mode != vo_status_t::MODE_KEYFRAME) return std::nullopt;
-  PassingError e;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) {
-      e.picture(i, j) = m.cov_picture_m2_rad2[i][j];
-      e.map(i, j) = m.cov_map_m2_rad2[i][j];
-    }
-  }
-  e.map_time = m.map_time_s;
-  return e;
 }
 
 Geodetic anchor_of(const pose_t& m) {
@@ -137,8 +165,8 @@ Geodetic anchor_of(const pose_t& m) {
 void fill_fused_pose(const Odometry& pose, const FusionReport& report, const std::optional<Geodetic>& anchor,
                      pose_t& m) {
   fill_pose(pose, m);
-  m.frame = anchor ? pose_t::FRAME_ENU : pose_t::FRAME_LOCAL;
-  if (anchor) {
+  m.frame = report.enu ? pose_t::FRAME_ENU : pose_t::FRAME_LOCAL;
+  if (report.enu && anchor) {
     m.anchor_lat_deg = anchor->latitude / kDegree;
     m.anchor_lon_deg = anchor->longitude / kDegree;
     m.anchor_height_m = anchor->height;
@@ -157,18 +185,37 @@ void fill_local_pose(const Odometry& pose, const FusionReport& report, pose_t& m
   fill_pose(pose, m);
   m.frame = pose_t::FRAME_LOCAL;
   m.scale = pose_t::SCALE_METRIC;
-  m.state = state_code(report.phase);
-  if (report.phase == FusionPhase::kWeak && report.local_validity == Validity::kValid) m.state = pose_t::STATE_RUNNING;
-  if (m.state != pose_t::STATE_RUNNING) m.reason = report.reason;
   m.reset_delta_q_wxyz[0] = 1.0;
+  m.state = state_code(report.phase);
+  if (report.phase != FusionPhase::kWaiting) {
+    m.state = pose_t::STATE_RUNNING;
+    if (report.local_validity != Validity::kValid) m.state = pose_t::STATE_WEAK;
+    if (report.local_validity == Validity::kInvalid) m.state = pose_t::STATE_LOST;
+  }
+  if (m.state != pose_t::STATE_RUNNING) m.reason = report.reason;
 }
 
-fusion_state_t fusion_state(const Fusion& fusion) {
-  fusion_state_t m{};
-  fill_modes(fusion.imm(), m);
+fusion_state2_t fusion_state(const Fusion& fusion, const LiteralFusion* literal) {
+  fusion_state2_t m{};
+  m.tie_scale = 1.0;
+  fill_source(fusion, m);
+  fill_modes(literal != nullptr ? literal->imm() : fusion.imm(), m);
   fill_channels(fusion, m);
-  fill_tie(fusion, m);
+  if (literal != nullptr) fill_literal(*literal, m);
   return m;
+}
+
+void literal_pose(const LiteralFusion& literal, const Fusion& fusion, FusedPoses& poses) {
+  const std::optional<Odometry> fused = literal.carried(fusion, poses.local);
+  poses.report.enu = fused.has_value();
+  poses.report.reset_counter = literal.resets();
+  poses.report.last_jump.setZero();
+  poses.report.last_jump_height = 0.0;
+  if (fused) poses.fused = *fused;
+  if (!fused) poses.fused.validity = Validity::kInvalid;
+  poses.report.validity = poses.fused.validity;
+  poses.report.phase = poses.fused.validity == Validity::kValid ? FusionPhase::kRunning : FusionPhase::kWeak;
+  poses.report.reason = !fused ? "waits for a pose" : literal.gnss() ? "" : "no GNSS";
 }
 
 aiding_t aiding(const ChannelSample& sample, const FusionChannelReport& report) {

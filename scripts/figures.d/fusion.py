@@ -1,7 +1,9 @@
-"""fusion: POSE_FUSED through outages, against the truth of simulated drives and of adis_semisim."""
+"""fusion: POSE_FUSED and POSE_LOCAL with the shipped configurations: through outages of simulated drives and of adis_semisim, on the demo drive drawn
+(pictures, one eye, 640x192), without GNSS, and with the INS dead. Drawn drives are kept in build/figures/pictures."""
 import csv
 import json
 import math
+import shutil
 import statistics
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,7 +12,7 @@ from support import Skipped
 CHANNEL = "POSE_FUSED"
 BLIND = "wheel_odometry,gnss_ins_ekf,imm_fusion"  # wheels and IMU alone
 SEEDS = range(1, 21)
-# Where figures.tsv asks for no number of seeds: the median of 20 of these ratios scatters by a third (lib/fusion/EVIDENCE.md, E6).
+# Where figures.tsv asks for no number of seeds: the median of 20 of these ratios scatters by a third.
 MANY_SEEDS = range(1, 201)
 LEAST_AVAILABILITY = 0.99
 TICK_US = 100_000  # of the errors
@@ -134,6 +136,172 @@ def adis_wheels_60s_m(runs):
     return runs.windows(CHANNEL, BLIND, "adis_semisim", 60, 300, 180, (0, 30, 60, 90, 120, 150))
 
 
+DRAWN_SIZE = "640x192"
+DRAWN_SEEDS = range(101, 111)
+CITY_DURATION_S = 90  # of city_loop drawn, as long as the demo drive
+WINDOW_US = 10_000_000
+WINDOWS_APART_US = 2_500_000
+DEAD = (30, 60)  # s after the log's begin: POSE_INS does not arrive
+
+
+def drawn(runs, scenario, seed):
+    """(log, vehicle folder) of a drive drawn as the demo drive is shipped, with the tracker's settings of configs/demo."""
+    folder = runs.folder("pictures") / f"{scenario}_{DRAWN_SIZE}_{seed}"
+    log, vehicle = folder / "drive.lcm", folder / "vehicle"
+    if not log.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        part = folder / "part.lcm"
+        extra = () if scenario == "demo" else ("--mono", "--camera-rate-hz", 10, "--duration", CITY_DURATION_S)
+        runs.roadfix("simulate", scenario, "--seed", seed, "--picture-size", DRAWN_SIZE, *extra, "--out", part, "--vehicle", vehicle)
+        part.rename(log)
+    shutil.copy(runs.root / "configs" / "demo" / "vo_tracker.yaml", vehicle)
+    return log, vehicle
+
+
+def shipped_vehicle(vehicle, folder):
+    """The vehicle's folder with no tuning but the demo's tracker: another measurement may have left its own beside it."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for name in ("calibration.yaml", "vo_tracker.yaml"):
+        shutil.copy(vehicle / name, folder / name)
+    return folder
+
+
+def fused_drive(runs, seed):
+    """Squared horizontal errors in the tunnel of POSE_FUSED, POSE_INS and POSE_VO, the last tied at the last good fix."""
+
+    def run():
+        log, vehicle = drawn(runs, "demo", seed)
+        folder = runs.folder("pictures") / f"demo_{DRAWN_SIZE}_{seed}" / "fusion"
+        out, report = folder / "out.lcm", folder / "report"
+        vehicle = shipped_vehicle(vehicle, folder / "vehicle")
+        runs.roadfix("replay", log, "--stages", "wheel_odometry,gnss_ins_ekf,vo_tracker,imm_fusion", "--config", vehicle, "--out", out)
+        squares = {}
+        for channel, align in ((CHANNEL, "none"), ("POSE_INS", "none"), ("POSE_VO", "tied")):
+            runs.roadfix("evaluate", out, "--out", report, "--channel", channel, "--align", align)
+            (outage,) = json.loads((report / "figures.json").read_text())["channels"][channel]["outages"]["each"]
+            with open(report / f"{channel}_errors.csv", newline="") as file:
+                rows = [row for row in csv.DictReader(file) if outage["first_withheld_us"] <= int(row["utime_us"]) <= outage["return_us"]]
+            squares[channel] = [float(row["longitudinal_m"]) ** 2 + float(row["lateral_m"]) ** 2 for row in rows]
+            if not rows:
+                raise Skipped(f"demo, seed {seed}: no {channel} in the tunnel")
+        out.unlink()
+        return squares
+
+    return runs.once(("fused_drive", seed), run)
+
+
+def ratio_to_best(drives):
+    """Root mean square of POSE_FUSED over that of the better of the two others, over all these drives."""
+    pooled = {channel: math.sqrt(statistics.mean(s for drive in drives for s in drive[channel])) for channel in drives[0]}
+    return pooled[CHANNEL] / min(pooled["POSE_INS"], pooled["POSE_VO"])
+
+
+def vs_best_pictures(runs):
+    return ratio_to_best([fused_drive(runs, seed) for seed in DRAWN_SEEDS])
+
+
+def worst_drive_ratio(runs):
+    return max(ratio_to_best([fused_drive(runs, seed)]) for seed in DRAWN_SEEDS)
+
+
+def poses(runs, log, channel):
+    """{utime: (x, y, yaw, forward, left velocity)} of a channel's usable poses."""
+    out = log.with_name("poses.csv")
+    runs.roadfix("export", log, "--channel", channel, "--format", "csv", "--out", out)
+    found = {}
+    with open(out, newline="") as file:
+        for row in csv.DictReader(file):
+            if row["validity"] == "invalid":
+                continue
+            w, x, y, z = (float(row[name]) for name in ("qw", "qx", "qy", "qz"))
+            yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+            found[int(row["utime_us"])] = (float(row["x_m"]), float(row["y_m"]), yaw, float(row["vel_x_mps"]), float(row["vel_y_mps"]))
+    return found
+
+
+def motion(a, b):
+    c, s = math.cos(a[2]), math.sin(a[2])
+    return c * (b[0] - a[0]) + s * (b[1] - a[1]), -s * (b[0] - a[0]) + c * (b[1] - a[1])
+
+
+def window_errors(estimate, reference):
+    """(squared errors of the motion over 10 s, every 2.5 s; squared errors of the velocity), at the reference's times."""
+    times = sorted(t for t in reference if t in estimate)
+    ends, velocities, next_us = [], [], 0
+    known = set(times)
+    for t in times:
+        velocities.append(sum((estimate[t][i] - reference[t][i]) ** 2 for i in (3, 4)))
+        if t < next_us or t + WINDOW_US not in known:
+            continue
+        next_us = t + WINDOWS_APART_US
+        (x, y), (x0, y0) = motion(estimate[t], estimate[t + WINDOW_US]), motion(reference[t], reference[t + WINDOW_US])
+        ends.append((x - x0) ** 2 + (y - y0) ** 2)
+    return ends, velocities
+
+
+def local_drives(runs):
+    """{channel: (squared window errors, squared velocity errors)} pooled over drawn drives without GNSS."""
+
+    def run():
+        pooled = {}
+        for scenario in ("demo", "city_loop"):
+            for seed in DRAWN_SEEDS:
+                log, vehicle = drawn(runs, scenario, seed)
+                folder = runs.folder("pictures") / f"{scenario}_{DRAWN_SIZE}_{seed}" / "no_gnss"
+                blind, out = folder / "blind.lcm", folder / "out.lcm"
+                vehicle = shipped_vehicle(vehicle, folder / "vehicle")
+                runs.roadfix("log", "filter", log, "--channel", "GNSS", "--invert", "--out", blind, "--overwrite")
+                runs.roadfix("replay", blind, "--stages", "wheel_odometry,gnss_ins_ekf,vo_tracker,imm_fusion", "--config", vehicle, "--out", out)
+                blind.unlink()
+                reference = poses(runs, out, "REFERENCE")
+                for channel in ("POSE_LOCAL", "POSE_VO", "POSE_WHEEL", "POSE_INS"):
+                    ends, velocities = window_errors(poses(runs, out, channel), reference)
+                    for kept, new in zip(pooled.setdefault(channel, ([], [])), (ends, velocities)):
+                        kept += new
+                out.unlink()
+        return pooled
+
+    return runs.once("local_drives", run)
+
+
+def local_ratio(runs, which):
+    """POSE_LOCAL over the best of its inputs; an input that is there for less than half of the time is none."""
+    pooled = {channel: squares[which] for channel, squares in local_drives(runs).items()}
+    most = len(pooled["POSE_LOCAL"])
+    inputs = [statistics.mean(s) for channel, s in pooled.items() if channel != "POSE_LOCAL" and len(s) > most / 2]
+    return math.sqrt(statistics.mean(pooled["POSE_LOCAL"]) / min(inputs))
+
+
+def failover_end_pct(runs):
+    """gnss_ins_ekf dies at 30 s of the drawn demo drive, at the tunnel's mouth, and camera and wheels go on: error 30 s later over the distance, median."""
+    shares = []
+    for seed in DRAWN_SEEDS:
+        log, vehicle = drawn(runs, "demo", seed)
+        folder = runs.folder("pictures") / f"demo_{DRAWN_SIZE}_{seed}" / "failover"
+        estimates, before, after, cut, out = (folder / f"{name}.lcm" for name in ("estimates", "before", "after", "cut", "out"))
+        vehicle = shipped_vehicle(vehicle, folder / "vehicle")
+        runs.roadfix("replay", log, "--stages", "wheel_odometry,gnss_ins_ekf,vo_tracker", "--config", vehicle, "--out", estimates)
+        # The channel goes at DEAD[0] and the log ends at DEAD[1].
+        runs.roadfix("log", "cut", estimates, "--to-s", DEAD[0], "--out", before, "--overwrite")
+        runs.roadfix("log", "cut", estimates, "--from-s", DEAD[0], "--to-s", DEAD[1], "--out", after, "--overwrite")
+        runs.roadfix("log", "filter", after, "--channel", "POSE_INS|INS_STATUS", "--invert", "--out", cut, "--overwrite")
+        whole = folder / "whole.lcm"
+        whole.write_bytes(before.read_bytes() + cut.read_bytes())
+        runs.roadfix("replay", whole, "--stages", "imm_fusion", "--config", vehicle, "--out", out)
+        runs.roadfix("evaluate", out, "--out", folder / "report", "--channel", CHANNEL)
+        with open(folder / "report" / f"{CHANNEL}_errors.csv", newline="") as file:
+            last = list(csv.DictReader(file))[-1]
+        reference = poses(runs, out, "REFERENCE")
+        begin = min(reference) + DEAD[0] * 1_000_000
+        way = [reference[t] for t in sorted(reference) if begin <= t <= int(last["utime_us"])]
+        distance = sum(math.dist(a[:2], b[:2]) for a, b in zip(way, way[1:]))
+        shares.append(100 * math.hypot(float(last["longitudinal_m"]), float(last["lateral_m"])) / distance)
+        for path in (estimates, before, after, cut, whole, out):
+            path.unlink()
+    return statistics.median(shares)
+
+
 MEASUREMENTS = {
     "lit_end_pct": lit_end_pct,
     "dark_end_pct": dark_end_pct,
@@ -143,5 +311,10 @@ MEASUREMENTS = {
     "nees": nees,
     "within_3sigma": within_3sigma,
     "adis_wheels_60s_m": adis_wheels_60s_m,
+    "vs_best_pictures": vs_best_pictures,
+    "worst_drive_ratio": worst_drive_ratio,
+    "local_vs_best": lambda runs: local_ratio(runs, 0),
+    "local_velocity_ratio": lambda runs: local_ratio(runs, 1),
+    "failover_end_pct": failover_end_pct,
     "step_us": lambda runs: runs.benchmark("fusion_bench", "cpu_per_step_s") * 1e6,
 }

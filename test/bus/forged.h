@@ -5,7 +5,7 @@
 #include <random>
 #include <roadfix/aiding_t.hpp>
 #include <roadfix/config_t.hpp>
-#include <roadfix/fusion_state_t.hpp>
+#include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/health_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
@@ -89,7 +89,7 @@ inline std::vector<Forged> forged_messages(std::mt19937& random) {
   forge<vo_status_t>("VO_STATUS", random, all);
   forge<vo_features2_t>("VO_FEATURES", random, all);
   forge<vo_restart_t>("VO_RESTART", random, all);
-  forge<fusion_state_t>("FUSION_STATE", random, all);
+  forge<fusion_state2_t>("FUSION_STATE", random, all);
   for (const char* channel : {"AIDING_INS", "AIDING_FUSION"}) forge<aiding_t>(channel, random, all);
   forge<health_t>("HEALTH", random, all);
   forge<heartbeat_t>("HEARTBEAT_RECORDER", random, all);

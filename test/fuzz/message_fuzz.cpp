@@ -1,7 +1,7 @@
 // Any bytes as a message of any type: what passes the check decodes, and encodes to the same bytes.
 #include <cstdlib>
 #include <roadfix/aiding_t.hpp>
-#include <roadfix/fusion_state_t.hpp>
+#include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
 #include <roadfix/image_t.hpp>
 #include <roadfix/ledger_t.hpp>
@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, std::size_t size) {
       try_type<aiding_t>(bytes);
       break;
     case 1:
-      try_type<fusion_state_t>(bytes);
+      try_type<fusion_state2_t>(bytes);
       break;
     case 2:
       try_type<heartbeat_t>(bytes);

@@ -82,5 +82,5 @@ def type_of_channel(channel):
                  "HEARTBEAT_": "heartbeat_t", "AIDING_": "aiding_t", "RAW_": "raw_t", "HORIZON_": "horizon_t"}
     by_name = {"REFERENCE": "pose_t", "IMU": "imu_t", "GNSS": "gnss_t", "WHEELS": "wheels_t", "MAG": "mag_t",
                "VO_FEATURES": "vo_features_t", "VO_STATUS": "vo_status_t", "VO_RESTART": "vo_restart_t", "INS_STATUS": "ins_status_t",
-               "FUSION_STATE": "fusion_state_t", "HEALTH": "health_t"}
+               "FUSION_STATE": "fusion_state2_t", "HEALTH": "health_t"}
     return by_name.get(channel) or next((t for p, t in by_prefix.items() if channel.startswith(p)), None)

@@ -47,13 +47,13 @@ Eigen::Vector2d far_off(double t_s) { return {t_s > 100.0 && t_s < 106.0 ? 15.0 
 const std::vector<Trouble>& troubles() {
   static const std::vector<Trouble> kFaults = {
       {"none", "no GNSS", 40.0, 100.0},
-      {"vo_scale_jump", "vision contradicts", 60.0, 100.0, true, true, scaled},
-      {"vo_frozen", "vision contradicts", 60.0, 100.0, true, true, frozen},
-      {"vo_confidently_wrong", "vision contradicts", 60.0, 100.0, true, true, astray},
-      {"gnss_dragged_off", "contradicts", 50.0, 80.0, false, true, {}, dragged},
-      {"gnss_15m_after_tunnel", "GNSS/INS contradicts", 100.0, 106.0, true, true, {}, far_off},
-      {"both_bad", "vision contradicts", 60.0, 106.0, true, true, astray, far_off},
-      {"ins_killed", "no GNSS/INS", 50.0, 70.0, false, true, {}, {}, FusionChannel::kIns},
+      {"vo_scale_jump", "POSE_VO contradicts", 60.0, 100.0, true, true, scaled},
+      {"vo_frozen", "POSE_VO contradicts", 60.0, 100.0, true, true, frozen},
+      {"vo_confidently_wrong", "POSE_VO contradicts", 60.0, 100.0, true, true, astray},
+      {"gnss_dragged_off", "POSE_INS contradicts", 50.0, 80.0, false, true, {}, dragged},
+      {"gnss_15m_after_tunnel", "POSE_INS", 100.0, 106.0, true, true, {}, far_off},
+      {"both_bad", "POSE_VO contradicts", 60.0, 106.0, true, true, astray, far_off},
+      {"ins_killed", "POSE_INS is silent", 50.0, 70.0, false, true, {}, {}, FusionChannel::kIns},
       {"vo_killed", "no GNSS", 60.0, 100.0, true, true, {}, {}, FusionChannel::kVo},
   };
   return kFaults;
@@ -88,21 +88,21 @@ Outcome run_fault(const Trouble& fault, std::uint64_t seed) {
   });
   Fusion fusion({});
   Outcome o;
-  run(fusion, events, [&](const Fusion& f, const StreamEvent& e) {
+  run(fusion, events, [&](const FusedPoses& f, const StreamEvent& e) {
     const double t = seconds(e.sample.odometry.t_us);
     if (fusion.asks_restart()) {
-      (void)fusion.take_restart(fusion.fused());
+      (void)fusion.take_restart(f.local);
       ++o.restarts;
     }
     if (t < fault.from_s) return;
-    const test::PlanarError p = test::planar_error(drive, f.fused());
+    const test::PlanarError p = test::planar_error(drive, f.fused);
     if (t <= fault.to_s) o.largest = std::max(o.largest, p.distance());
     if (t > fault.to_s + kSettle) o.after = std::max(o.after, p.distance());
     o.within += p.distance() < 3.0 * std::sqrt(p.cov.topLeftCorner<2, 2>().trace()) ? 1.0 : 0.0;
     o.samples += 1.0;
-    if (!o.said_after && f.report().reason.find(fault.said) != std::string::npos) o.said_after = t - fault.from_s;
+    o.resets = f.report.reset_counter;
+    if (!o.said_after && f.report.reason.find(fault.said) != std::string::npos) o.said_after = t - fault.from_s;
   });
-  o.resets = fusion.report().reset_counter;
   return o;
 }
 

@@ -88,8 +88,9 @@ Json processes_json(const std::vector<ProcessReport>& processes) {
   return json;
 }
 
-Json fusion_json(const fusion_state_t& m) {
-  Json json = {{"modes", Json::array()}, {"channels", Json::array()}, {"tied", m.tie_valid}, {"frozen", m.tie_frozen}};
+Json fusion_json(const fusion_state2_t& m) {
+  Json json = {{"modes", Json::array()}, {"channels", Json::array()}, {"source", m.source}, {"leader", m.leader}};
+  json["reason"] = m.reason;
   for (std::size_t i = 0; i < m.mode_name.size(); ++i) {
     json["modes"].push_back({{"name", m.mode_name[i]}, {"p", number(m.mode_probability[i], 3)}});
   }
@@ -100,6 +101,8 @@ Json fusion_json(const fusion_state_t& m) {
                                 {"nis", number(m.channel_nis[i], 2)},
                                 {"gate", number(m.channel_gate[i], 1)},
                                 {"status", m.channel_status[i]},
+                                {"health", m.channel_health[i]},
+                                {"contradicts", m.channel_contradicts[i]},
                                 {"age", number(m.channel_age_s[i], 2)}});
   }
   return json;

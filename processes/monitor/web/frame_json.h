@@ -3,7 +3,7 @@
 #pragma once
 
 #include <optional>
-#include <roadfix/fusion_state_t.hpp>
+#include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/ins_status_t.hpp>
 #include <roadfix/protection_level_t.hpp>
@@ -38,7 +38,7 @@ struct FrameParts {
   std::vector<FramePose> poses;
   std::optional<FrameMark> reference;
   std::optional<Eigen::Vector2d> fix;  ///< of the newest GNSS fix: east, north of the antenna, m
-  const fusion_state_t* fusion = nullptr;
+  const fusion_state2_t* fusion = nullptr;
   const vo_status_t* vo_status = nullptr;
   const vo_features2_t* features = nullptr;
   const ins_status_t* ins_status = nullptr;

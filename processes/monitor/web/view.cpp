@@ -39,8 +39,8 @@ void DriveView::message(const std::string& channel, const std::string& type, con
     PoseFacts facts = pose_facts(decode<pose_t>(message.bytes));
     health_.to_common_frame(facts);
     if (facts.anchor) reference_.add(now_us, facts);
-  } else if (type == "fusion_state_t") {
-    fusion_ = decode<fusion_state_t>(message.bytes);
+  } else if (type == "fusion_state2_t") {
+    fusion_ = decode<fusion_state2_t>(message.bytes);
   } else if (type == "vo_status_t") {
     vo_status_ = decode<vo_status_t>(message.bytes);
   } else if (type == "vo_features2_t" && board_.watched()) {

@@ -3,7 +3,7 @@
 
 #include <map>
 #include <optional>
-#include <roadfix/fusion_state_t.hpp>
+#include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/ins_status_t.hpp>
 #include <roadfix/protection_level_t.hpp>
@@ -58,7 +58,7 @@ class DriveView : public MonitorListener {
   int64_t framed_us_ = 0;
   std::map<std::string, Pin> pins_;
   PoseMonitor reference_;
-  std::optional<fusion_state_t> fusion_;
+  std::optional<fusion_state2_t> fusion_;
   std::optional<vo_status_t> vo_status_;
   std::optional<vo_features2_t> features_;
   std::optional<ins_status_t> ins_status_;

@@ -12,6 +12,7 @@
 #include "config/config.h"
 #include "geodesy/enu_change.h"
 #include "geometry/frames.h"
+#include "roadfix/aiding_t.hpp"
 #include "roadfix/config_t.hpp"
 #include "roadfix/protection_level_t.hpp"
 
@@ -125,13 +126,15 @@ ProtectionSample protection_of(const protection_level_t& m) {
   for (std::size_t r = 0; r < m.risk.size(); ++r) sample.level.emplace_back(m.along_m[r], m.across_m[r], m.up_m[r]);
   return sample;
 }
+constexpr const char* kAidingChannel = "AIDING_INS";
 
 /// The checks of the types that are read here.
 struct Checks {
   MessageCheck pose = Schema::built_in().check_of("pose_t");
   MessageCheck config = Schema::built_in().check_of("config_t");
-  MessageCheck fusion = Schema::built_in().check_of("fusion_state_t");
+  MessageCheck fusion = Schema::built_in().check_of("fusion_state2_t");
   MessageCheck protection = Schema::built_in().check_of("protection_level_t");
+  MessageCheck aiding = Schema::built_in().check_of("aiding_t");
 };
 
 /// Collects what a log holds: add() takes note of an event and says whether it is a message of its channel's type;
@@ -146,10 +149,12 @@ class LogCollector {
     const bool fusion = channel == "FUSION_STATE";
     if (channel == kReferenceChannel || channel.starts_with("POSE_")) log_.pose_channels.insert(channel);
     const bool protection = channel.starts_with(kProtection);
-    if (!is_pose(channel) && !config && !fusion && !protection) return true;
+    const bool aiding = channel == kAidingChannel;
+    if (!is_pose(channel) && !config && !fusion && !protection && !aiding) return true;
     const MessageCheck& check = config       ? checks_.config
                                 : fusion     ? checks_.fusion
                                 : protection ? checks_.protection
+                                : aiding     ? checks_.aiding
                                              : checks_.pose;
     if (check(event.data) != CheckResult::kOk) return false;
     const Header header = *read_header(event.data);
@@ -168,20 +173,35 @@ class LogCollector {
         if (channel == "CONFIG_DRIVE") {
           read_facts(decode<config_t>(event.data), reader_.path(), log_);
         } else if (channel == "FUSION_STATE") {
-          append(decode<fusion_state_t>(event.data), log_.fusion);
+          append(decode<fusion_state2_t>(event.data), log_.fusion);
         } else if (channel.starts_with(kProtection)) {
           log_.protection["POSE_" + channel.substr(kProtection.size())].push_back(
               protection_of(decode<protection_level_t>(event.data)));
+        } else if (channel == kAidingChannel) {
+          const aiding_t aiding = decode<aiding_t>(event.data);
+          if (aiding.source == aiding_t::SOURCE_GNSS_POSITION && aiding.status == aiding_t::STATUS_ACCEPTED)
+            log_.accepted_fixes_us.push_back(aiding.measurement_utime);
         } else {
           builder.add(decode<pose_t>(event.data), event.timestamp_us);
         }
       }
       if (is_pose(channel)) log_.poses.emplace(channel, builder.take());
     }
+    find_outages();
     return std::move(log_);
   }
 
  private:
+  /// Of a drive from which no tool has cut any.
+  void find_outages() {
+    if (!log_.facts.outages.empty()) return;
+    std::sort(log_.accepted_fixes_us.begin(), log_.accepted_fixes_us.end());
+    log_.facts.outages = outages_between(log_.accepted_fixes_us);
+    if (log_.facts.outages.empty()) return;
+    log_.notes.push_back(fmt::format("{} outages were found: no fix was accepted for more than {} s",
+                                     log_.facts.outages.size(), kLeastOutage));
+  }
+
   struct Noted {
     std::vector<Stamp> stamps;
     std::vector<uint64_t> offsets;
@@ -189,7 +209,7 @@ class LogCollector {
 
   [[nodiscard]] bool is_pose(const std::string& channel) const {
     if (channel == kReferenceChannel) return true;
-    if (channel == "CONFIG_DRIVE" || channel == "FUSION_STATE") return false;
+    if (channel == "CONFIG_DRIVE" || channel == "FUSION_STATE" || channel == kAidingChannel) return false;
     return channels_.empty() ? channel.starts_with("POSE_") : channels_.contains(channel);
   }
 

@@ -42,7 +42,8 @@ struct EvaluationLog {
   std::set<std::string> pose_channels;      ///< POSE_* and REFERENCE that the log holds, read or not
   std::map<std::string, std::vector<ProtectionSample>> protection;  ///< by the channel of the poses that it bounds
   FusionSeries fusion;
-  std::vector<std::string> notes;  ///< what a reader of the figures must know: damage, missing facts
+  std::vector<int64_t> accepted_fixes_us;  ///< of the INS, by AIDING_INS
+  std::vector<std::string> notes;          ///< what a reader of the figures must know: damage, missing facts
 };
 
 /// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE and FUSION_STATE, each in

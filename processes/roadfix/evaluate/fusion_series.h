@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evaluation/modes.h"
-#include "roadfix/fusion_state_t.hpp"
+#include "roadfix/fusion_state2_t.hpp"
 
 namespace roadfix {
 
@@ -16,7 +16,7 @@ struct FusionSeries {
   std::map<std::string, std::vector<double>> weights;  ///< by channel, one per message; 0 where it is not listed
 };
 
-inline void append(const fusion_state_t& state, FusionSeries& series) {
+inline void append(const fusion_state2_t& state, FusionSeries& series) {
   series.t_us.push_back(state.utime);
   for (int i = 0; i < state.num_modes; ++i) {
     const auto mode = static_cast<std::size_t>(i);

@@ -7,6 +7,7 @@
 #include <random>
 #include <roadfix/aiding_t.hpp>
 #include <roadfix/config_t.hpp>
+#include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/fusion_state_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/health_t.hpp>
@@ -43,7 +44,7 @@ std::map<std::string, int64_t> generated_fingerprints() {
 std::map<std::string, int64_t> all_generated() {
   return generated_fingerprints<aiding_t, config_t, fusion_state_t, gnss_t, health_t, protection_level_t, heartbeat_t, horizon_t, image_t,
                                 imu_t, ins_status_t, ledger_entry_t, ledger_t, mag_t, pose_t, provenance_t, raw_t,
-                                state_t, vo_features2_t, vo_features_t, vo_restart_t, vo_status_t, wheels_t>();
+                                fusion_state2_t, state_t, vo_features2_t, vo_features_t, vo_restart_t, vo_status_t, wheels_t>();
 }
 
 ledger_t some_ledger() {
@@ -114,7 +115,7 @@ TEST_CASE("every message starts with utime, run and seq") {
 }
 
 TEMPLATE_TEST_CASE("a message is intact only at its exact length", "", imu_t, gnss_t, pose_t, ledger_t, aiding_t,
-                   state_t, fusion_state_t, heartbeat_t) {
+                   state_t, fusion_state2_t, heartbeat_t) {
   TestType message{};
   if constexpr (std::is_same_v<TestType, ledger_t>) message = some_ledger();
   if constexpr (std::is_same_v<TestType, aiding_t>) message = some_aiding();

@@ -1,7 +1,7 @@
 /// Seeded numbers for the fusion's tests.
 #pragma once
 
-#include "fusion/fusion_state.h"
+#include "fusion/motion_model.h"
 #include "simulation/random.h"
 
 namespace roadfix::test {
@@ -23,13 +23,11 @@ class Draws {
 
 inline FusionEstimate random_estimate(Draws& draws) {
   FusionEstimate e;
-  e.x.head<fusion::kStates>() = draws.vector<fusion::kStates>(1.0);
+  e.x = draws.vector<fusion::kSize>(1.0);
   e.x(fusion::kSpeed) = 10.0 + draws.normal(3.0);
-  for (const int i : {int{fusion::kVoScale}, int{fusion::kWheelScale}}) e.x(i) = draws.normal(0.05);
-  e.x(fusion::kVoTurns) = draws.normal(0.05);
-  fusion::StatesCovariance A;
-  for (int i = 0; i < fusion::kStates; ++i) A.col(i) = draws.vector<fusion::kStates>(0.2);
-  e.P.topLeftCorner<fusion::kStates, fusion::kStates>() = A * A.transpose();
+  fusion::Matrix A;
+  for (int i = 0; i < fusion::kSize; ++i) A.col(i) = draws.vector<fusion::kSize>(0.2);
+  e.P = A * A.transpose();
   return e;
 }
 

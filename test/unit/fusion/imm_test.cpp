@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "draws.h"
-#include "fusion/measurement.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"
 #include "support/numerical_jacobian.h"
@@ -22,10 +21,7 @@ using test::random_estimate;
 void step(Imm& imm, const Planar& pose) {
   mix(imm, mode_transition(0.1, {10.0, 4.0}));
   predict(imm, MotionNoise{}, 0.1);
-  for (Mode& mode : imm.modes) {
-    const FusionMeasurement<3> m = absolute_pose(mode.estimate.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
-    mode.log_likelihood += kalman_update<3>(mode.estimate, m.H, m.innovation, m.R).log_likelihood;
-  }
+  update_pose(imm, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
   reweigh(imm);
 }
 
@@ -51,15 +47,17 @@ std::vector<Planar> turning_car() {
 TEST_CASE("an IMM of equal models is one filter, to the bit") {
   Imm imm = two(MotionKind::kConstantTurn, MotionKind::kConstantTurn);
   imm.probability << 0.3, 0.7;
-  FusionEstimate single = imm.modes[0].estimate;
+  Imm other = imm;
+  other.probability << 1.0, 0.0;
+  const Eigen::Matrix2d stays = Eigen::Matrix2d::Identity();
   for (const Planar& pose : turning_car()) {
     step(imm, pose);
-    move(single, MotionKind::kConstantTurn, MotionNoise{}, 0.1);
-    const FusionMeasurement<3> m = absolute_pose(single.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
-    (void)kalman_update<3>(single, m.H, m.innovation, m.R);
+    mix(other, stays);
+    predict(other, MotionNoise{}, 0.1);
+    update_pose(other, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
   }
-  CHECK(combine(imm).x == single.x);
-  CHECK(combine(imm).P == single.P);
+  CHECK(combine(imm).x == other.modes[0].estimate.x);
+  CHECK(combine(imm).P == other.modes[0].estimate.P);
 }
 
 TEST_CASE("permuted models give permuted output") {
@@ -70,11 +68,7 @@ TEST_CASE("permuted models give permuted output") {
     for (Imm* imm : {&a, &b}) {
       mix(*imm, T);
       predict(*imm, MotionNoise{}, 0.1);
-      for (Mode& mode : imm->modes) {
-        const FusionMeasurement<3> m =
-            absolute_pose(mode.estimate.x, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
-        mode.log_likelihood += kalman_update<3>(mode.estimate, m.H, m.innovation, m.R).log_likelihood;
-      }
+      update_pose(*imm, pose, Eigen::Vector3d(0.1, 0.1, 0.01).asDiagonal());
       reweigh(*imm);
     }
   }
@@ -116,10 +110,7 @@ TEST_CASE("a car that turns is told from one that does not") {
     for (int i = 0; i < steps; ++i) {
       mix(imm, mode_transition(0.05, {10.0, 4.0}));
       predict(imm, MotionNoise{}, 0.05);
-      for (Mode& mode : imm.modes) {
-        const FusionMeasurement<1> m = absolute_component(mode.estimate.x, kTurn, turn, 0.01);
-        mode.log_likelihood += kalman_update<1>(mode.estimate, m.H, m.innovation, m.R).log_likelihood;
-      }
+      update_component(imm, kTurn, turn, 1e-4);
       reweigh(imm);
     }
   };
@@ -138,16 +129,22 @@ TEST_CASE("Jacobians of both models") {
     if (i == 0) x.setZero();
     if (i == 1) x(kTurn) = 1e-9;
     for (const MotionKind kind : {MotionKind::kConstantAcceleration, MotionKind::kConstantTurn}) {
-      const auto f = [&](const Eigen::Matrix<double, kBase, 1>& d) {
-        Vector full = Vector::Zero();
-        full.head<kBase>() = d;
-        return Eigen::Matrix<double, kBase, 1>(
-            difference(moved(plus(x, full), kind, 0.1), moved(x, kind, 0.1)).head<kBase>());
+      const auto f = [&](const Vector& d) {
+        return Vector(difference(moved(plus(x, d), kind, 0.1), moved(x, kind, 0.1)));
       };
-      const BaseMatrix numerical = test::numerical_jacobian<kBase, kBase>(f, 1e-5);
+      const Matrix numerical = test::numerical_jacobian<kSize, kSize>(f, 1e-5);
       CHECK((moved_jacobian(x, kind, 0.1) - numerical).cwiseAbs().maxCoeff() < 1e-7);
+      CHECK((2.0 * moved_jacobian(x, kind, 0.1) - numerical).cwiseAbs().maxCoeff() > 1e-3);  // teeth
     }
   }
+}
+
+TEST_CASE("infinite variance has no effect on a mode") {
+  Imm imm = two(MotionKind::kConstantAcceleration, MotionKind::kConstantTurn);
+  const FusionEstimate before = imm.modes[0].estimate;
+  update_component(imm, kSpeed, 100.0, 1e300);
+  CHECK((imm.modes[0].estimate.x - before.x).norm() < 1e-12);
+  CHECK((imm.modes[0].estimate.P - before.P).norm() < 1e-12);
 }
 
 TEST_CASE("two half steps of the turn are one whole one") {

@@ -1,188 +1,100 @@
-/// What a sample tells of the motion since the one before: its covariance less what is shared, and its velocities.
+/// Poses seen from above, motions by velocities, and how a motion's error grows.
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 
 #include "draws.h"
-#include "fusion/measurement.h"
+#include "fusion/channel_calibration.h"
 #include "geometry/euler.h"
+#include "geometry/so3.h"
+#include "support/numerical_jacobian.h"
 
 namespace roadfix {
-
-using namespace fusion;
-
 namespace {
 
 using test::Draws;
-using test::random_estimate;
 
-TEST_CASE("growth of a covariance becomes the covariance of the motion, and learning does not make it negative") {
-  const Planar a(0.0, 0.0, 0.5), motion(2.0, 0.0, 0.1);
-  const Eigen::Matrix3d P = Eigen::Vector3d(0.04, 0.04, 1e-4).asDiagonal();
-  const Eigen::Matrix3d carry = after_motion_by_start(a, motion);
-  const Eigen::Matrix3d Q = Eigen::Vector3d(0.01, 0.02, 1e-5).asDiagonal();  // in a's axes
-  const Eigen::Matrix3d to_frame = motion_by_end(a).transpose();
-  const Eigen::Matrix3d grown = carry * P * carry.transpose() + to_frame * Q * to_frame.transpose();
-  CHECK((motion_covariance(a, P, motion, grown, {1e-3, 1e-3, 1e-4}) - Q).norm() < 1e-9);
-  const Eigen::Matrix3d learnt = motion_covariance(a, P, motion, 0.1 * P, {1e-3, 1e-3, 1e-4});
-  CHECK((learnt - Eigen::Vector3d(1e-6, 1e-6, 1e-8).asDiagonal().toDenseMatrix()).norm() < 1e-12);
-}
-
-TEST_CASE("a velocity whose error lasts adds up to what it has in common with the place, not to a sum of steps") {
-  // A velocity that walks, and is measured now and then; the place is led by it and never corrected.
-  constexpr double kStep = 0.1, kWalk = 0.01, kMeasured = 0.01;  // s, (m/s)2 per s, (m/s)2
-  constexpr double kYaw = 0.7;
-  Eigen::Matrix2d P = Eigen::Vector2d(0.0, 0.04).asDiagonal();  // of place and velocity, along or across
-  LastingVelocity lasting;
-  lasting.carry(kYaw, 0.0, {P(1, 1), 4.0 * P(1, 1), 9.0 * P(1, 1)});
-  Eigen::Vector3d told = Eigen::Vector3d::Zero();
-  double steps = 0.0;
-  for (int i = 0; i < 300; ++i) {
-    told += lasting.grown(kYaw, kStep);
-    steps += kStep * kStep * P(1, 1);
-    const Eigen::Matrix2d F = (Eigen::Matrix2d() << 1.0, kStep, 0.0, 1.0).finished();
-    P = F * P * F.transpose();
-    P(1, 1) += kStep * kWalk;
-    lasting.carry(kYaw, kStep, {P(1, 1), 4.0 * P(1, 1), 9.0 * P(1, 1)});
-    if (i % 10 != 9) continue;
-    const double kept = kMeasured / (P(1, 1) + kMeasured);  // of the velocity's error: the place is not estimated
-    P.row(1) *= kept;
-    P(0, 1) = P(1, 0);
-    lasting.carry(kYaw, 0.0, {P(1, 1), 4.0 * P(1, 1), 9.0 * P(1, 1)});
-  }
-  CHECK(told.x() == Approx(P(0, 0)).epsilon(1e-9));
-  CHECK(told.y() == Approx(4.0 * P(0, 0)).epsilon(1e-9));
-  CHECK(told.z() == Approx(9.0 * P(0, 0)).epsilon(1e-9));  // a yaw by its rate
-  CHECK(steps < 0.2 * P(0, 0));                            // teeth
-}
-
-TEST_CASE("a velocity's error lasts in the vehicle's axes when it turns") {
-  LastingVelocity lasting;
-  lasting.carry(0.0, 0.0, {0.04, 0.0, 0.01});
-  lasting.carry(0.0, 1.0, {0.04, 0.0, 0.01});
-  CHECK(lasting.grown(0.0, 1.0).x() == Approx(0.12));  // (2 s)^2 - (1 s)^2
-  CHECK(lasting.grown(M_PI_2, 1.0).x() == Approx(0.04));
-  CHECK(lasting.grown(M_PI, 1.0).x() == Approx(-0.04));  // comes back
-  CHECK(lasting.grown(M_PI, 1.0).z() == Approx(0.03));   // a yaw does not
-}
-
-TEST_CASE("what a vision's whole way has in common is taken out of its covariance, and no more than is there") {
-  const auto at = [](double way) {  // 1 cm2 and 1e-6 rad2 per metre of its own
-    Odometry o;
-    o.velocity = {10.0, 0.2, 0.0};
-    Vector6d own;
-    own << Eigen::Vector3d::Constant(1e-4 * way), Eigen::Vector3d::Constant(1e-6 * way);
-    o.cov_pose = own.asDiagonal();
-    o.cov_velocity = 0.01 * Eigen::Matrix3d::Identity();
-    return o;
-  };
-  const auto common = [](double way) {
-    CommonError e;
-    e.columns.col(0) << 0.01 * way, 0.001 * way, 0.0, 0.0, 0.0, 0.0;
-    e.columns.col(1) << 0.0, 0.003 * way, 0.0, 0.0, 0.0, 0.004;
-    e.scale_std = 0.01;
-    return e;
-  };
-  const auto published = [&](double way) {
-    Odometry o = at(way);
-    o.cov_pose += common(way).columns * common(way).columns.transpose();
-    o.cov_velocity += 1e-4 * o.velocity * o.velocity.transpose();
-    return o;
-  };
-  const Odometry back = without_common(published(500.0), common(500.0));
-  CHECK(back.cov_pose.isApprox(at(500.0).cov_pose, 1e-9));
-  CHECK(back.cov_velocity.isApprox(at(500.0).cov_velocity, 1e-9));
-  // A step of a metre: its own part, and what it would be with the common part left in, 5 m long after 500.
-  const Planar motion(1.0, 0.0, 0.0);
-  const auto step = [&](auto&& of) {
-    return motion_covariance(Planar::Zero(), level_view(of(500.0)).P, motion, level_view(of(501.0)).P,
-                             Eigen::Vector3d::Constant(1e-5))(0, 0);
-  };
-  CHECK(step([&](double way) { return without_common(published(way), common(way)); }) == Approx(1e-4).epsilon(0.02));
-  CHECK(step(published) > 0.05);  // teeth
-  // A status was lost: what is told is not in there.
-  const Odometry kept = without_common(at(500.0), common(500.0));
-  CHECK(Eigen::SelfAdjointEigenSolver<Matrix6d>(kept.cov_pose).eigenvalues().minCoeff() > -1e-12);
-}
-
-TEST_CASE("what a picture has wrong alone is taken out of its covariance, and told in the vehicle's axes") {
-  PassingError passing;
-  Vector6d own;
-  own << 0.04, 0.01, 0.01, 1e-6, 1e-6, 4e-6;
-  passing.picture = own.asDiagonal();
-  passing.map = 2.0 * passing.picture;
-  passing.map_time = 1.5;
-  Odometry o;
-  o.T_frame_vehicle.q = quaternion({M_PI_2, 0.0, 0.0});
-  o.cov_pose = Matrix6d::Identity() + passing.picture;
-  CHECK((without_picture(o, passing).cov_pose - Matrix6d::Identity()).norm() < 1e-9);
-  o.cov_pose = 0.5 * passing.picture;  // a status was lost
-  CHECK(Eigen::SelfAdjointEigenSolver<Matrix6d>(without_picture(o, passing).cov_pose).eigenvalues().minCoeff() >
-        -1e-12);
-  const PlanarPassing planar = planar_passing(o, passing);  // the car looks along the frame's y
-  CHECK((planar.picture - Eigen::Vector3d(0.01, 0.04, 4e-6).asDiagonal().toDenseMatrix()).norm() < 1e-12);
-  CHECK((planar.map - 2.0 * planar.picture).norm() < 1e-12);
-  CHECK(planar.map_time == 1.5);
-}
-
-TEST_CASE("a picture's error that is singular, or not quite a covariance, is taken out as far as it is one") {
-  Vector6d along;
-  along << 0.2, 0.4, 0.1, 1e-3, 0.0, 2e-3;  // it errs in one direction alone
-  const Matrix6d flat = along * along.transpose();
-  const auto left = [](const Matrix6d& cov, const Matrix6d& picture) {
-    PassingError passing;
-    passing.picture = picture;
-    Odometry o;
-    o.cov_pose = cov;
-    return without_picture(o, passing).cov_pose;
-  };
-  const Matrix6d one = Matrix6d::Identity();
-  CHECK((left(one + flat, flat) - one).norm() < 1e-9);
-  // Rounding, or a sum of losses: an eigenvalue below zero. Only what is an error goes.
-  const Vector6d aside = Vector6d::Unit(4);
-  CHECK((left(one + flat, flat - 1e-3 * aside * aside.transpose()) - one).norm() < 1e-9);
-  CHECK(left(one, Matrix6d::Constant(std::numeric_limits<double>::quiet_NaN())) == one);
-  // Teeth: Cholesky's factor, as far as it came, is no root of it.
-  const Matrix6d unfinished = flat.llt().matrixL();
-  CHECK((unfinished * unfinished.transpose() - flat).norm() > 1e-3);
-  // A pose that is exact in one direction cannot hold an error there: nothing is taken out.
-  Matrix6d exact = one;
-  exact(1, 1) = 0.0;
-  CHECK(left(exact, flat) == exact);
-}
-
-TEST_CASE("an error as a channel's vehicle has it, in the state's axes and lengths") {
-  Draws draws(9);
-  const FusionEstimate e = random_estimate(draws);
-  const Eigen::Matrix3d A = draws.vector<9>(1.0).reshaped(3, 3), R = A * A.transpose();
-  for (const ChannelSlots slots : {ChannelSlots{kVoClone, kVoScale, kVoTurns, {}, {}}, ChannelSlots{}}) {
-    // A pose of the channel that is moved by d in its vehicle's axes moves the state's by this.
-    Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
-    J.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(e.x(kYaw)).toRotationMatrix();
-    if (slots.scale) J.leftCols<2>() *= std::exp(-e.x(*slots.scale));
-    CHECK(in_frame(R, e.x, slots).isApprox(J * R * J.transpose(), 1e-9));
+TEST_CASE("Jacobians of planar motion") {
+  Draws draws(2);
+  for (int i = 0; i < 20; ++i) {
+    const Planar a = draws.vector<3>(1.0), b = draws.vector<3>(1.0), m = draws.vector<3>(1.0);
+    const auto by_a = [&](const Eigen::Vector3d& d) { return motion_between(a + d, b); };
+    const auto by_b = [&](const Eigen::Vector3d& d) { return motion_between(a, b + d); };
+    const auto after = [&](const Eigen::Vector3d& d) { return after_motion(a + d, m); };
+    const auto by_motion = [&](const Eigen::Vector3d& d) { return after_motion(a, m + d); };
+    CHECK((motion_by_start(a, b) - test::numerical_jacobian<3, 3>(by_a)).norm() < 1e-7);
+    CHECK((motion_by_end(a) - test::numerical_jacobian<3, 3>(by_b)).norm() < 1e-7);
+    CHECK((moved_by(a, m).by_start - test::numerical_jacobian<3, 3>(after)).norm() < 1e-7);
+    CHECK((moved_by(a, m).by_motion - test::numerical_jacobian<3, 3>(by_motion)).norm() < 1e-7);
+    CHECK((after_motion(a, motion_between(a, b)) - Planar(b.x(), b.y(), wrap_angle(b.z()))).norm() < 1e-12);
   }
 }
 
-TEST_CASE("errors that last from picture to picture count as often as they are the same") {
-  constexpr double kStep = 0.1, kTime = 1.2;
-  constexpr int kPictures = 400, kRuns = 400;
-  const auto source = std::make_unique<test::Draws>(5);
-  const double keeps = std::exp(-2.0 * kStep / kTime);
-  double squares = 0.0;  // of the mean of many pictures
-  for (int run = 0; run < kRuns; ++run) {
-    double e = source->normal(1.0), sum = 0.0;
-    for (int i = 0; i < kPictures; ++i) {
-      sum += e + source->normal(0.5);
-      e = keeps * e + source->normal(std::sqrt(1.0 - keeps * keeps));
+/// A calibration with the given mean: learnt from motions that err by it.
+ChannelCalibration learnt(const CalibrationVector& truth, Draws& draws) {
+  ChannelCalibration c(CalibrationNoise{0.05, 0.02, 0.02, 2e-3, 1.0, 0.0, 0.0, 0.0});
+  for (int i = 0; i < 400; ++i) {
+    const Planar way(40.0 + draws.normal(10.0), draws.normal(1.0), draws.normal(0.4));
+    const double dt = 5.0;
+    // What a channel measures of it, (F.4.1) turned round.
+    const double turn = std::exp(truth(kTurns)) * way.z() + truth(kDrift) * dt;
+    const double bend = truth(kHeading) - 0.5 * (way.z() - turn);
+    Planar measured;
+    const Eigen::Vector2d aside = way.z() * Eigen::Vector2d(-std::sin(0.5 * way.z()), std::cos(0.5 * way.z()));
+    measured << std::exp(truth(kScale)) * (Eigen::Rotation2Dd(bend) * (way.head<2>() - truth(kArm) * aside)), turn;
+    const MotionStep step = c.corrected(measured, dt);
+    MotionSum sum;
+    sum.add(step);
+    sum.Q = Eigen::Vector3d(1e-4, 1e-4, 1e-6).asDiagonal();
+    c.learn(sum, way + Planar(draws.normal(0.02), draws.normal(0.02), draws.normal(1e-3)),
+            Eigen::Vector3d(4e-4, 4e-4, 1e-6).asDiagonal());
+  }
+  return c;
+}
+
+TEST_CASE("scale, direction, share of the turns and drift are learnt, each within its sigma") {
+  Draws draws(5);
+  CalibrationVector truth;
+  truth << 0.03, -0.01, 0.01, 1e-3, 0.4;
+  const ChannelCalibration c = learnt(truth, draws);
+  for (int i = 0; i < kCalibration; ++i) {
+    CAPTURE(i, c.mean()(i), truth(i), std::sqrt(c.covariance()(i, i)));
+    CHECK(std::abs(c.mean()(i) - truth(i)) < 3.5 * std::sqrt(c.covariance()(i, i)));
+    CHECK(std::abs(c.mean()(i) - truth(i)) < 0.2 * std::abs(truth(i)));
+  }
+  CalibrationVector other = truth;
+  other(kScale) = -0.03;
+  CHECK(std::abs(c.mean()(kScale) - other(kScale)) > 100.0 * std::sqrt(c.covariance()(kScale, kScale)));  // teeth
+}
+
+TEST_CASE("Jacobian of a corrected motion, and of a sum of them, by the calibration") {
+  Draws draws(6);
+  const auto with = [](const CalibrationVector& x, const std::vector<Planar>& steps) {
+    // corrected() with a mean of x, through set_scale for the scale and learning for the rest: by hand here.
+    MotionSum sum;
+    for (const Planar& measured : steps) {
+      const double turn = std::exp(-x(kTurns)) * (measured.z() - x(kDrift) * 0.1);
+      const double bend = -x(kHeading) + 0.5 * (turn - measured.z());
+      MotionStep step;
+      const Eigen::Vector2d aside = turn * Eigen::Vector2d(-std::sin(0.5 * turn), std::cos(0.5 * turn));
+      step.motion << std::exp(-x(kScale)) * (Eigen::Rotation2Dd(bend) * measured.head<2>()) + x(kArm) * aside, turn;
+      sum.add(step);
     }
-    squares += sum * sum / kPictures / kRuns;
+    return sum.motion;
+  };
+  std::vector<Planar> steps;
+  for (int i = 0; i < 30; ++i) steps.emplace_back(1.3 + draws.normal(0.1), draws.normal(0.02), draws.normal(0.03));
+  const ChannelCalibration c(CalibrationNoise{});
+  MotionSum sum;
+  for (const Planar& measured : steps) sum.add(c.corrected(measured, 0.1));
+  CHECK((sum.motion - with(CalibrationVector::Zero(), steps)).norm() < 1e-12);
+  for (int i = 0; i < kCalibration; ++i) {
+    CalibrationVector d = CalibrationVector::Zero();
+    d(i) = 1e-5;
+    const Planar numerical = (with(d, steps) - with(-d, steps)) / 2e-5;
+    CAPTURE(i);
+    CHECK((sum.by_calibration.col(i) - numerical).norm() < 1e-4 * std::max(1.0, numerical.norm()));
+    CHECK((-sum.by_calibration.col(i) - numerical).norm() > 0.1);  // teeth: a sign
   }
-  const PlanarPassing told{0.25 * Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity(), kTime};
-  CHECK(squares == Approx(as_white(told, kStep)(1, 1)).epsilon(0.2));
-  CHECK(squares > 5.0 * (told.picture + told.map)(1, 1));  // teeth: as if each were new
-  CHECK(as_white(told, 100.0).isApprox(told.picture + told.map, 1e-9));
-  CHECK(as_white({told.picture, told.map, 0.0}, kStep).isApprox(told.picture + told.map, 1e-9));
 }
 
 TEST_CASE("velocities tell the motion without the jump") {

@@ -108,6 +108,7 @@ std::vector<StreamEvent> ins_stream(const SimulatedDrive& drive, const InsNoise&
     o.cov_velocity.diagonal().setConstant(c2 * east.P(1, 1));
     o.validity = outage ? Validity::kCoasting : Validity::kValid;
     event.sample.channel = FusionChannel::kIns;
+    event.sample.enu = event.sample.by_velocity = true;
     events.push_back(event);
   }
   return events;
@@ -133,7 +134,7 @@ std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& n
       last = truth;
       if (n.fault && !n.fault(static_cast<double>(t_us) * 1e-6, motion)) continue;
       const Planar from = planar_pose(estimate), to = after_motion(from, motion);
-      const Eigen::Matrix3d carry = after_motion_by_start(from, motion);
+      const Eigen::Matrix3d carry = moved_by(from, motion).by_start;
       Eigen::Matrix3d P = carry * planar_covariance(estimate) * carry.transpose();
       P.diagonal() += Eigen::Vector3d(sigma * sigma, sigma * sigma, n.yaw_step * n.yaw_step);
       estimate.T_frame_vehicle.p << to.x(), to.y(), estimate.T_frame_vehicle.p.z() + rise;
@@ -160,7 +161,7 @@ std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& n
 }
 
 std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, VoNoise noise, std::uint64_t seed) {
-  noise.turns_std = 0.0;
+  noise.turns_std = 1e-3;
   std::vector<StreamEvent> events = vo_stream(drive, noise, seed + 1000);
   for (StreamEvent& e : events) e.sample.channel = FusionChannel::kWheel;
   return events;
@@ -180,7 +181,7 @@ void run(Fusion& fusion, const std::vector<StreamEvent>& events, const OnFused& 
   for (const StreamEvent& e : events) {
     if (e.sample.channel == FusionChannel::kIns) fusion.set_gnss(e.sample.odometry.t_us, e.gnss);
     (void)fusion.add(e.sample);
-    on_fused(fusion, e);
+    on_fused(fusion.publish({}), e);
   }
 }
 

@@ -47,14 +47,14 @@ struct StreamEvent {
 
 std::vector<StreamEvent> ins_stream(const SimulatedDrive& drive, const InsNoise& noise, std::uint64_t seed);
 std::vector<StreamEvent> vo_stream(const SimulatedDrive& drive, const VoNoise& noise, std::uint64_t seed);
-/// As the VO's, in the wheels' channel, but for the turns' share: the fusion knows none of wheels.
+/// As the VO's, in the wheels' channel, with the turns' share of a gyro.
 std::vector<StreamEvent> wheel_stream(const SimulatedDrive& drive, VoNoise noise, std::uint64_t seed);
 
 /// In the order of time, GNSS/INS first.
 std::vector<StreamEvent> merged(const std::vector<std::vector<StreamEvent>>& streams);
 
-/// Called after each sample.
-using OnFused = std::function<void(const Fusion&, const StreamEvent&)>;
+/// Called after each sample, with what is published then.
+using OnFused = std::function<void(const FusedPoses&, const StreamEvent&)>;
 void run(Fusion& fusion, const std::vector<StreamEvent>& events, const OnFused& on_fused);
 
 /// Error of a pose in the plane: truth minus estimate, and its covariance.

@@ -1,4 +1,4 @@
-/// A minute of tunnel on a simulated city drive, with made-up streams, and who watches the fused pose in it.
+/// A minute of tunnel on a simulated city drive, with made-up streams, and what the fused pose does in it.
 #pragma once
 
 #include <string>
@@ -44,13 +44,15 @@ struct Watch {
   double largest_sigma = 0.0;
   bool said = false;  ///< the words appeared in the reason
   std::string words{};
-  void operator()(const Fusion& f, const StreamEvent& e) {
+  bool always_usable = true;  ///< the pose was never invalid
+  void operator()(const FusedPoses& f, const StreamEvent& e) {
     const double t = seconds(drive, e.sample.odometry.t_us);
     if (t < from_s || t > to_s) return;
-    const PlanarError p = planar_error(drive, f.fused());
+    const PlanarError p = planar_error(drive, f.fused);
     largest = std::max(largest, p.distance());
     largest_sigma = std::max(largest_sigma, std::sqrt(p.cov.topLeftCorner<2, 2>().trace()));
-    said = said || (!words.empty() && f.report().reason.find(words) != std::string::npos);
+    said = said || (!words.empty() && f.report.reason.find(words) != std::string::npos);
+    always_usable = always_usable && f.fused.validity != Validity::kInvalid;
   }
 };
 

@@ -12,7 +12,7 @@ const MEANINGS = {
   CAMERA_LEFT: 'pictures of the camera', CAMERA_RIGHT: 'pictures of the right camera', GNSS: 'satellite receiver', IMU: 'accelerations and turn rates',
   MAG: 'compass', WHEELS: 'wheel speeds', POSE_FUSED: 'the fused estimate', POSE_LOCAL: 'the fused one without its jumps', POSE_INS: 'estimate of GNSS + inertial',
   POSE_VO: 'estimate of the camera', POSE_VO_MAP: 'the same in its map’s frame', POSE_WHEEL: 'estimate of the wheels', VO_FEATURES: 'points in the picture',
-  VO_STATUS: 'how the camera’s estimate goes', INS_STATUS: 'how GNSS + inertial goes', FUSION_STATE: 'what the fusion believes', REFERENCE: 'the truth, to compare',
+  VO_STATUS: 'how the camera’s estimate goes', INS_STATUS: 'how GNSS + inertial goes', FUSION_STATE: 'what the fusion uses', REFERENCE: 'the truth, to compare',
   recorder: 'writes the log', gnss_ins_ekf: 'estimates by GNSS + inertial', wheel_odometry: 'estimates by the wheels', vo_tracker: 'estimates by the camera',
   imm_fusion: 'fuses the estimates', monitor: 'this page and the verdict',
   camera_driver: 'reads the camera', gnss_driver: 'reads the receiver', imu_driver: 'reads the IMU', wheel_driver: 'reads the wheels',

@@ -56,13 +56,19 @@ export function showFusion(frame) {
     const row = element('div', '', { class: 'weight', style: `--colour: ${colour(channel.name)}` });
     const rail = element('div', '', { class: 'rail' });
     rail.append(element('div', '', { style: `width: ${used ? Math.round(100 * channel.weight) : 0}%` }));
-    row.title = `weight ${channel.weight}, its own covariance times ${channel.alpha}, NIS ${channel.nis} of at most ${channel.gate}, used ${channel.age} s ago`;
-    row.append(element('span', title(channel.name)), rail, element('span', used ? `${Math.round(100 * channel.weight)} %` : 'not used'));
+    row.title = `weight ${channel.weight}, variance times ${channel.alpha}, NIS ${channel.nis} of at most ${channel.gate}, heard ${channel.age} s ago`;
+    const health = HEALTH[channel.health] || 'not used';
+    if (channel.contradicts) row.title += `; contradicts ${channel.contradicts}`;
+    const words = health === 'good' ? `${used ? Math.round(100 * channel.weight) : 0} %` : health;
+    row.append(element('span', title(channel.name)), rail, element('span', words));
     return row;
   }));
-  const tie = fusion.tied ? (fusion.frozen ? 'The camera’s frame was tied to the map; the tie is frozen until GNSS is back.' : 'The camera’s frame is tied to the map.') : '';
-  byId('tie').textContent = tie;
+  const leader = fusion.leader ? title(fusion.leader) : 'nobody';
+  const sources = ['There is no pose yet.', 'The fused pose is GNSS + inertial’s.', `The last trusted pose is carried on by ${leader}.`, 'The fused pose is the paper’s scheme’s.'];
+  byId('tie').textContent = `${sources[fusion.source] || ''} ${fusion.reason ? `Why: ${fusion.reason}.` : ''}`.trim();
 }
+
+const HEALTH = ['silent', 'says it is invalid', 'frozen', 'on trial', 'contradicted', 'good'];
 
 /** A head that begins with '-' is a column that a narrow screen goes without. */
 function table(id, heads, rows) {

@@ -30,17 +30,7 @@ inline constexpr double kAnchor_deg[] = {37.5, 127.0};
 class Wire {
  public:
   explicit Wire(int64_t late_us = 0, int64_t run = 1) : late_us_(late_us), run_(run) {
-    for (int i = 0; i < 6; ++i) status_.cov_picture_m2_rad2[i][i] = i < 3 ? 2.5e-5 : 4e-8;
-    status_.map_time_s = 1.2;
-  }
-
-  /// What the vision says that its local map has wrong, rad.
-  void say_map_yaw(double sigma) { status_.cov_map_m2_rad2[5][5] = sigma * sigma; }
-
-  /// Two eyes, and what their turns share: rad of yaw.
-  void say_stereo(double turned) {
     status_.scale_source = vo_status_t::SCALE_FROM_STEREO;
-    status_.shared_error_m_rad[1][5] = turned;
   }
 
   template <class T>
@@ -110,9 +100,9 @@ inline void offer(StageRunner& runner, const Arrival& a) {
   runner.offer(static_cast<int>(its - inputs.begin()), a.bytes);
 }
 
-inline Caught run(const std::vector<Arrival>& messages) {
+inline Caught run(const std::vector<Arrival>& messages, const ImmFusionConfig& config = {}) {
   Caught sink;
-  StageRunner runner(make_imm_fusion(Calibration{}, ImmFusionConfig{}), sink);
+  StageRunner runner(make_imm_fusion(Calibration{}, config), sink);
   for (const Arrival& a : messages) offer(runner, a);
   return sink;
 }

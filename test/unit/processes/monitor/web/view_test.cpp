@@ -142,11 +142,14 @@ TEST_CASE("what is no number, or meant to harm, is data and nothing else") {
 TEST_CASE("fusion, camera and history are in the frame") {
   Bench bench;
   bench.drive(2.0);
-  fusion_state_t fusion{};
+  fusion_state2_t fusion{};
   fusion.num_modes = 2;
   fusion.mode_name = {"constant_acceleration", "constant_turn"};
   fusion.mode_probability = {0.25, 0.75};
   fusion.mode_log_likelihood = {0.0, 0.0};
+  fusion.source = fusion_state2_t::SOURCE_CARRIED;
+  fusion.leader = "POSE_WHEEL";
+  fusion.reason = "POSE_INS is silent";
   bench.send("FUSION_STATE", kStart_us + 2'000'000, fusion);
   image_t image{};
   image.width_px = image.height_px = 1;
@@ -160,6 +163,9 @@ TEST_CASE("fusion, camera and history are in the frame") {
   bench.send("IMU", kStart_us + 2'600'000, fusion);
   const auto frame = bench.frame();
   CHECK(frame["fusion"]["modes"][1]["p"] == 0.75);
+  CHECK(frame["fusion"]["source"] == 2);
+  CHECK(frame["fusion"]["leader"] == "POSE_WHEEL");
+  CHECK(frame["fusion"]["reason"] == "POSE_INS is silent");
   CHECK(frame["camera"]["features"][0] == nlohmann::json::array({5, 10.0, 20.0, 2}));
   CHECK(frame["camera"]["picture"] == std::to_string(kStart_us + 2'010'000));
   CHECK(bench.board.picture(kStart_us + 2'020'000));

@@ -256,7 +256,7 @@ TEST_CASE("a name that is no text is shown as far as it is one") {
 
 TEST_CASE("modes and weights come from the fusion's state by name") {
   const Folder folder("fusion");
-  fusion_state_t state{};
+  fusion_state2_t state{};
   state.num_modes = 2;
   state.mode_name = {"constant_acceleration", "constant_turn"};
   state.mode_probability = {0.25, 0.75};
@@ -266,7 +266,10 @@ TEST_CASE("modes and weights come from the fusion's state by name") {
     state.channel_name = names;
     state.channel_weight = weights;
     state.channel_status.assign(names.size(), 0);
-    for (auto* values : {&state.channel_alpha, &state.channel_nis, &state.channel_gate, &state.channel_age_s}) {
+    state.channel_health.assign(names.size(), fusion_state2_t::HEALTH_GOOD);
+    state.channel_contradicts.assign(names.size(), "");
+    for (auto* values : {&state.channel_alpha, &state.channel_yaw_alpha, &state.channel_nis, &state.channel_gate,
+                         &state.channel_age_s, &state.channel_scale, &state.channel_scale_std}) {
       values->assign(names.size(), 0.0);
     }
   };

@@ -1,4 +1,4 @@
-#include "fusion/frame_tie.h"
+#include "papers/frame_tie.h"
 
 #include <cmath>
 

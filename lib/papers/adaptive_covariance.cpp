@@ -1,4 +1,4 @@
-#include "fusion/adaptive_covariance.h"
+#include "papers/adaptive_covariance.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,38 +1,10 @@
-/// Agreement with hysteresis, and the adaptive covariance of Lee et al. (2025).
+/// The adaptive covariance of Lee et al. (2025).
 #include <catch2/catch.hpp>
 
-#include "fusion/adaptive_covariance.h"
-#include "fusion/arbitration.h"
+#include "papers/adaptive_covariance.h"
 
 namespace roadfix {
 namespace {
-
-TEST_CASE("the normalised test sees a pure jump of the position") {
-  const WeightedMotion wheels{{1.0, 0.0, 0.0}, 1e-4 * Eigen::Matrix3d::Identity()};
-  const WeightedMotion visual{{1.2, 0.0, 0.0}, 1e-4 * Eigen::Matrix3d::Identity()};
-  CHECK(squared_distance(wheels, visual) == Approx(0.04 / 2e-4));
-}
-
-TEST_CASE("agreement has hysteresis") {
-  const AgreementConfig c{16.3, 3, 7.8, 4};
-  AgreementState a;
-  for (const double d : {100.0, 100.0, 1.0, 100.0, 100.0}) compare(a, c, d);
-  CHECK(a.agrees);
-  compare(a, c, 100.0);
-  CHECK(!a.agrees);
-  for (const double d : {1.0, 1.0, 1.0, 10.0, 1.0, 1.0, 1.0}) compare(a, c, d);
-  CHECK(!a.agrees);
-  compare(a, c, 1.0);
-  CHECK(a.agrees);
-}
-
-TEST_CASE("two motions are weighted by their covariances") {
-  const WeightedMotion good{{1.0, 0.0, 0.0}, 0.01 * Eigen::Matrix3d::Identity()};
-  const WeightedMotion poor{{2.0, 0.0, 0.0}, 0.03 * Eigen::Matrix3d::Identity()};
-  const WeightedMotion mean = weighted_mean(good, poor);
-  CHECK(mean.motion.x() == Approx(1.25));
-  CHECK(mean.covariance(0, 0) == Approx(0.0075));
-}
 
 TEST_CASE("Lee et al.'s ramp goes there and back without a step") {
   AdaptiveConfig c;

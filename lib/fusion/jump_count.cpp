@@ -1,0 +1,48 @@
+#include "fusion/jump_count.h"
+
+#include <cmath>
+
+namespace roadfix {
+namespace {
+
+constexpr double kTurn = 0.05;  ///< rad
+
+}  // namespace
+
+void JumpCount::add(const Odometry& fused, const Odometry& local, bool enu, double least) {
+  const Planar now = planar_pose(fused), local_now = planar_pose(local);
+  const double height = fused.T_frame_vehicle.p.z(), local_height = local.T_frame_vehicle.p.z();
+  if (started_) {
+    const Planar jump = difference_of(now, after_motion(fused_, motion_between(local_, local_now)));
+    const double rise = height - height_ - (local_height - local_height_);
+    if (enu != enu_ || std::hypot(jump.head<2>().norm(), rise) > least || std::abs(jump.z()) > kTurn) {
+      ++count_;
+      last_ = jump;
+      last_height_ = rise;
+    }
+  }
+  started_ = true;
+  enu_ = enu;
+  fused_ = now;
+  local_ = local_now;
+  height_ = height;
+  local_height_ = local_height;
+}
+
+void JumpCount::save(StateWriter& writer) const {
+  writer.put(started_);
+  writer.put(enu_);
+  writer.put(count_);
+  for (const Planar* p : {&last_, &fused_, &local_}) writer.put(*p);
+  for (const double v : {last_height_, height_, local_height_}) writer.put(v);
+}
+
+void JumpCount::load(StateReader& reader) {
+  reader.get(started_);
+  reader.get(enu_);
+  reader.get(count_);
+  for (Planar* p : {&last_, &fused_, &local_}) reader.get(*p);
+  for (double* v : {&last_height_, &height_, &local_height_}) reader.get(*v);
+}
+
+}  // namespace roadfix
