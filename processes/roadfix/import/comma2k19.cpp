@@ -206,7 +206,7 @@ class CommaImporter {
         throw ConfigError(frame_times_.file, 0, fmt::format("row {}: time runs backwards", row));
       drive_.reference.push_back(point);
     }
-    constexpr double kAssumed = 1.0;  // m; the dataset tells no accuracy of its poses
+    constexpr double kAssumed = 1.0;  // m; the dataset gives no accuracy of its poses
     drive_.description.reference = {ReferenceOf::kImu, true, kAssumed};
     say("reference is global_pose, of the camera, taken as the IMU's; its accuracy is not told: 1 m is assumed");
   }

@@ -25,8 +25,8 @@ std::vector<int64_t> epochs(const CommaLog& log) {
 }
 
 GnssFix fix(int64_t t_us, double lat_deg, double lon_deg, double height, double speed, double bearing_deg) {
-  constexpr double kPlace = 5.0, kHeight = 10.0;  // m, as for ROS fixes that tell none
-  constexpr double kSpeed = 0.3, kUp = 10.0;      // m/s; the receiver tells no climb
+  constexpr double kPlace = 5.0, kHeight = 10.0;  // m, as for ROS fixes that give none
+  constexpr double kSpeed = 0.3, kUp = 10.0;      // m/s; the receiver gives no climb
   GnssFix fix;
   fix.t_us = t_us;
   fix.fix_type = FixType::kSingle;
