@@ -112,13 +112,13 @@ bool KeyframeTracker::hold_at_standstill(const CameraFrame& frame, const std::ve
   // A rotation moves all tracks alike; a translation does not.
   const double noise_px = kMedianNoise * config_.sigma_px / std::sqrt(static_cast<double>(shifts.size()));
   const double turn = std::hypot(median_of(shifts).norm(), noise_px) / left_.focal();
-  const double way = kStandingDepth * still_px / left_.focal();
+  const double displacement = kStandingDepth * still_px / left_.focal();
   Vector6d variances;
-  variances << Eigen::Vector3d::Constant(way * way), Eigen::Vector3d::Constant(turn * turn);
+  variances << Eigen::Vector3d::Constant(displacement * displacement), Eigen::Vector3d::Constant(turn * turn);
   out_.state = TrackState::kWeak;
   out_.reason = "standing, with few landmarks";
   accept_pose(frame.t_us, map_.last().T_map_camera, variances.asDiagonal());
-  if (few) make_keyframe(frame, features, StandstillSigma{way, turn});
+  if (few) make_keyframe(frame, features, StandstillSigma{displacement, turn});
   return true;
 }
 
@@ -147,19 +147,19 @@ bool KeyframeTracker::track_bearing_only(const CameraFrame& frame, const std::ve
   const Eigen::Vector3d ahead = rig_.T_vehicle_left.q.conjugate() * (forward * Eigen::Vector3d::UnitX());
   const BearingOnlyConfig config{left_.focal(), config_.sigma_px, config_.gate_px, config_.weak_inliers, ahead};
   const double length_sigma = std::max(kMinDistanceSigma, measured->travelled.sigma);
-  auto way = bearing_only_pose(first, second, measured->travelled.distance, length_sigma, q_start, config);
-  if (!way) return false;
-  const auto of_camera = camera_distance(from.t_us, SE3{}, frame.t_us, way->T_first_second);
-  if (of_camera) way->T_first_second.p = of_camera->travelled.distance * ahead;
+  auto pose = bearing_only_pose(first, second, measured->travelled.distance, length_sigma, q_start, config);
+  if (!pose) return false;
+  const auto of_camera = camera_distance(from.t_us, SE3{}, frame.t_us, pose->T_first_second);
+  if (of_camera) pose->T_first_second.p = of_camera->travelled.distance * ahead;
   out_.state = TrackState::kWeak;
   out_.reason = "pulling away, with few landmarks";
-  accept_pose(frame.t_us, from.T_map_camera * way->T_first_second,
-              rotated(way->cov_pose(length_sigma), {from.T_map_camera.q, {}, 1.0}));
+  accept_pose(frame.t_us, from.T_map_camera * pose->T_first_second,
+              rotated(pose->cov_pose(length_sigma), {from.T_map_camera.q, {}, 1.0}));
   int points = 0;
   for (size_t k = 0; k < index.size(); ++k) {
-    if (!way->inlier[k]) out_.features[index[k]].status = FeatureStatus::kOutlier;
-    const std::array<Ray, 2> rays{ray(SE3{}, first[k]), ray(way->T_first_second, second[k])};
-    points += way->inlier[k] && triangulate(rays, config_.min_parallax_deg * kDegree) ? 1 : 0;
+    if (!pose->inlier[k]) out_.features[index[k]].status = FeatureStatus::kOutlier;
+    const std::array<Ray, 2> rays{ray(SE3{}, first[k]), ray(pose->T_first_second, second[k])};
+    points += pose->inlier[k] && triangulate(rays, config_.min_parallax_deg * kDegree) ? 1 : 0;
   }
   if (points < std::min(config_.start_points, static_cast<int>(index.size()) / 2)) return true;
   drop_outlier_tracks(features);
@@ -250,10 +250,10 @@ void KeyframeTracker::add_scale_drift(const BundleJob& job) {
   const auto held = std::find_if(problem.views.rbegin(), problem.views.rend(), [](const auto& v) { return v.fixed; });
   if (held == problem.views.rbegin() || held == problem.views.rend()) return;
   const auto steps = static_cast<double>(held - problem.views.rbegin());
-  const Eigen::Vector3d way = problem.views.back().T_map_camera.p - held->T_map_camera.p;
-  const double length2 = way.squaredNorm();
+  const Eigen::Vector3d displacement = problem.views.back().T_map_camera.p - held->T_map_camera.p;
+  const double length2 = displacement.squaredNorm();
   if (!(length2 > 0.0)) return;
-  const double along = way.dot(job.report.clustered_cov_last.topLeftCorner<3, 3>() * way) / length2;
+  const double along = displacement.dot(job.report.clustered_cov_last.topLeftCorner<3, 3>() * displacement) / length2;
   const double lost = kRandomWalkFactor * along / (length2 * steps);
   considered_.add_scale_drift(lost);
   considered_closed_.add_scale_drift(lost);

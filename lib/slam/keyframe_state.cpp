@@ -12,15 +12,15 @@ namespace {
 
 /// Age of the information behind a restart request (docs/DESIGN.md, section 4: the largest lateness).
 constexpr int64_t kRestartLatency_us = 250'000;
-constexpr double kMinScaleWay = 3.0;  ///< m, distance required before speeds set the scale of a map
+constexpr double kMinScaleDistance = 3.0;  ///< m, distance required before speeds set the scale of a map
 
-/// Distance of the camera for a vehicle that travels `way` along an arc while the camera moves by T_begin_end, of which
-/// the direction of p is used:
+/// Distance of the camera for a vehicle that goes `travelled` along an arc while the camera moves by T_begin_end, of
+/// which the direction of p is used:
 /// lambda t + w
 /// = chord, with w the displacement of the vehicle's origin by the rotation alone.
-std::optional<double> camera_path(double way, const SE3& T_begin_end, const Eigen::Vector3d& p_camera_vehicle) {
+std::optional<double> camera_path(double travelled, const SE3& T_begin_end, const Eigen::Vector3d& p_camera_vehicle) {
   const double half_turn = 0.5 * log_q(T_begin_end.q).norm();
-  const double chord = half_turn > 1e-6 ? way * std::sin(half_turn) / half_turn : way;
+  const double chord = half_turn > 1e-6 ? travelled * std::sin(half_turn) / half_turn : travelled;
   const double length = T_begin_end.p.norm();
   if (!(length > 1e-6)) return std::nullopt;
   const Eigen::Vector3d t = T_begin_end.p / length;
@@ -128,11 +128,11 @@ std::optional<KeyframeTracker::MeasuredDistance> KeyframeTracker::measured_dista
                                                                                     int64_t end_us) const {
   std::optional<MeasuredDistance> best;
   double best_sigma = 0.0;
-  const auto consider = [&](const std::optional<TravelledDistance>& way, SpeedSource source) {
-    if (!way) return;
-    const double sigma = std::hypot(way->sigma, way->scale_std * way->distance);
+  const auto consider = [&](const std::optional<TravelledDistance>& travelled, SpeedSource source) {
+    if (!travelled) return;
+    const double sigma = std::hypot(travelled->sigma, travelled->scale_std * travelled->distance);
     if (best && sigma >= best_sigma) return;
-    best = MeasuredDistance{*way, source};
+    best = MeasuredDistance{*travelled, source};
     best_sigma = sigma;
   };
   const ScaleChoice scale = config_.scale;
@@ -151,9 +151,9 @@ std::optional<KeyframeTracker::MeasuredDistance> KeyframeTracker::camera_distanc
   auto known = measured_distance(begin_us, end_us);
   if (!known) return known;
   const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
-  const auto way = camera_path(known->travelled.distance, T_map_begin.inverse() * T_map_end, T_camera_vehicle.p);
-  if (!way) return std::nullopt;
-  known->travelled.distance = *way;
+  const auto travelled = camera_path(known->travelled.distance, T_map_begin.inverse() * T_map_end, T_camera_vehicle.p);
+  if (!travelled) return std::nullopt;
+  known->travelled.distance = *travelled;
   return known;
 }
 
@@ -174,7 +174,8 @@ void KeyframeTracker::initialise_scale() {
     if (!known || !(length > 0.0)) continue;
     if (scale_ != ScaleSource::kNone) {
       set_scale_source(*known);
-    } else if (known->travelled.distance > kMinScaleWay && known->travelled.sigma < 0.1 * known->travelled.distance) {
+    } else if (known->travelled.distance > kMinScaleDistance &&
+               known->travelled.sigma < 0.1 * known->travelled.distance) {
       const double factor = known->travelled.distance / length;
       map_.rescale(factor);
       if (motion_) motion_->T_before_now.p *= factor;

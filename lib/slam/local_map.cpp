@@ -160,8 +160,9 @@ BundleJob LocalMap::make_bundle(const DistanceBetween& travel) const {
     if (i == 0) continue;
     const int view = static_cast<int>(i);
     if (k.standstill) problem.standstills.push_back({view - 1, view, *k.standstill});
-    if (const auto way = travel(keyframes_[i - 1], k)) {
-      problem.distances.push_back({view - 1, view, way->distance, std::max(kMinDistanceSigma, way->sigma), true});
+    if (const auto travelled = travel(keyframes_[i - 1], k)) {
+      problem.distances.push_back(
+          {view - 1, view, travelled->distance, std::max(kMinDistanceSigma, travelled->sigma), true});
     } else if (k.reference_distance) {
       problem.distances.push_back({view - 1, view, *k.reference_distance, kUnitSigma * *k.reference_distance});
     }

@@ -170,8 +170,9 @@ bool LoopCloser::add_place(const PlaceView& view, bool continuous) {
     constraint.b = static_cast<int>(id);
     const SE3 T = T_odom_last_.inverse() * view.T_odom_camera;
     constraint.S_a_b = {T.q, T.p, 1.0};
-    const double way = T.p.norm();
-    constraint.sigma << Eigen::Vector3d::Constant(continuous ? kMinOdometrySigma + kOdometryShare * way : kJumpSigma),
+    const double length = T.p.norm();
+    constraint.sigma << Eigen::Vector3d::Constant(continuous ? kMinOdometrySigma + kOdometryShare * length
+                                                             : kJumpSigma),
         Eigen::Vector3d::Constant(continuous ? kOdometryRotationSigma : kJumpRotationSigma), kScaleDrift;
     odometry_constraints_.push_back(constraint);
   }
@@ -186,9 +187,9 @@ bool LoopCloser::add_place(const PlaceView& view, bool continuous) {
   loop.a = static_cast<int>(known_id);
   loop.b = static_cast<int>(id);
   loop.S_a_b = {s.T_map_camera.q, s.T_map_camera.p, found->scale};
-  const double way_sigma = std::max(kMinLoopPositionSigma, std::sqrt(s.cov.topLeftCorner<3, 3>().trace()));
+  const double position_sigma = std::max(kMinLoopPositionSigma, std::sqrt(s.cov.topLeftCorner<3, 3>().trace()));
   const double turn_sigma = std::max(kMinLoopRotationSigma, std::sqrt(s.cov.bottomRightCorner<3, 3>().trace()));
-  loop.sigma << Eigen::Vector3d::Constant(way_sigma), Eigen::Vector3d::Constant(turn_sigma), kLoopScaleSigma;
+  loop.sigma << Eigen::Vector3d::Constant(position_sigma), Eigen::Vector3d::Constant(turn_sigma), kLoopScaleSigma;
   loops_.push_back(loop);
 
   std::vector<Sim3> nodes;

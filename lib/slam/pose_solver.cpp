@@ -40,7 +40,7 @@ Normal linearise(std::span<const PosePoint> points, const SE3& T, const PoseSolv
 }
 
 /// Sets inliers, their RMS and the covariance (S.4.3) at the solution.
-void judge(std::span<const PosePoint> points, const PoseSolverConfig& config, PoseSolution& solution) {
+void finish_solution(std::span<const PosePoint> points, const PoseSolverConfig& config, PoseSolution& solution) {
   const PosedCamera eye(solution.T_map_camera, config.lens);
   Matrix6d H = Matrix6d::Zero();
   double sum = 0.0;
@@ -79,7 +79,7 @@ std::optional<PoseSolution> solve_pose(std::span<const PosePoint> points, const 
       solution.T_map_camera = retract(solution.T_map_camera, d);
     }
   }
-  judge(points, config, solution);
+  finish_solution(points, config, solution);
   if (solution.num_inliers < config.min_inliers || !solution.cov.allFinite()) return std::nullopt;
   return solution;
 }
