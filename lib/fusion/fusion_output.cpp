@@ -115,8 +115,7 @@ Validity Fusion::validity_now() const {
   const double sigma = std::sqrt(failover_.pose().covariance(channels_).topLeftCorner<2, 2>().trace());
   if (!local_.leader() && local_.unled(t_us_) > config_.unled) return Validity::kInvalid;
   if (sigma > config_.lost_sigma && failover_.enu()) return Validity::kInvalid;
-  if (failover_.enu() || !local_.leader()) return Validity::kCoasting;
-  return Validity::kValid;  // in a local frame, and led
+  return Validity::kCoasting;  // in a local frame as well: where on the map it is, nobody knows
 }
 
 /// A worse validity counts at once, a better one when it has held for a while.

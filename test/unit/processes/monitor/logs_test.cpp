@@ -4,10 +4,10 @@
 #include <roadfix/imu_t.hpp>
 
 #include "bus/log/log_writer.h"
+#include "bus/log/merged_logs.h"
 #include "bus/run/replay.h"
 #include "bus/types/message.h"
 #include "monitor/handler.h"
-#include "bus/log/merged_logs.h"
 #include "roadfix/stages.h"
 #include "support/shared_data.h"
 #include "support/temporary_folder.h"
@@ -61,10 +61,13 @@ double share(const std::vector<HealthReport>& reports, double from, double to, V
 
 }  // namespace
 
-TEST_CASE("the demo drive: not before it is aligned, degraded in the tunnel, well before and after") {
+TEST_CASE(
+    "the demo drive: not before there is a pose, not OK before it is aligned, degraded in the tunnel, well before and "
+    "after") {
   const std::vector<HealthReport> reports = monitored({test::source_path("logs/demo.lcm"), estimates()});
   CHECK(reports.size() > 890);
-  CHECK(share(reports, 0.0, 1.0, Verdict::kDoNotUse) == 1.0);
+  CHECK(share(reports, 0.0, 0.5, Verdict::kDoNotUse) == 1.0);
+  CHECK(share(reports, 1.0, 2.0, Verdict::kOk) == 0.0);  // a pose in a local frame
   CHECK(share(reports, 4.0, 20.0, Verdict::kOk) == 1.0);
   CHECK(share(reports, 31.0, 60.0, Verdict::kDegraded) == 1.0);
   CHECK(share(reports, 63.0, 90.0, Verdict::kOk) > 0.95);
