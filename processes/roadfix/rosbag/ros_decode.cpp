@@ -121,7 +121,10 @@ class RosDecoder {
     value.items.clear();
     for (uint64_t i = 0; i < count; ++i) {
       if (step.kind == Kind::kStruct) {
+        const std::size_t before = position_;
         decode(type_.programs_[step.nested], value.items.emplace_back());
+        // Arrays of these within each other would be as many as anyone likes, of no bytes at all.
+        if (position_ == before) throw RosError("an array of messages without a field");
       } else if (step.kind == Kind::kText) {
         text();
       } else if (step.kind == Kind::kTime) {

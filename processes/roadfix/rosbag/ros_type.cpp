@@ -127,7 +127,9 @@ class RosCompiler {
       step.nested = compile(nested);
     }
     step.slot = program.slots.size();
-    program.slots.emplace(prefix + field.name, step.slot);
+    if (!program.slots.emplace(prefix + field.name, step.slot).second) {
+      throw RosError(fmt::format("field '{}{}' is defined twice", prefix, field.name));
+    }
     program.steps.push_back(step);
   }
 
