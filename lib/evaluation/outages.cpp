@@ -12,6 +12,8 @@ namespace {
 constexpr double kReconvergenceFactor = 1.1;
 /// Below this path an outage is standing still and an error in percent of it means nothing.
 constexpr double kStandstill_m = 1.0;
+/// By which the end of an outage that was found lies before the fix that ended it: the estimate there has none of it.
+constexpr int64_t kBeforeReturn_us = 200'000;
 
 double path_between(const Trajectory& reference, int64_t begin_us, int64_t end_us) {
   double length = 0.0;
@@ -66,7 +68,7 @@ std::vector<Outage> outages_between(const std::vector<int64_t>& accepted_us, dou
   std::vector<Outage> outages;
   for (std::size_t i = 1; i < accepted_us.size(); ++i) {
     if (seconds_between(accepted_us[i - 1], accepted_us[i]) <= least_s) continue;
-    outages.push_back({accepted_us[i - 1] + 1, accepted_us[i] - 1, accepted_us[i]});
+    outages.push_back({accepted_us[i - 1] + 1, accepted_us[i] - kBeforeReturn_us, accepted_us[i]});
   }
   return outages;
 }

@@ -17,7 +17,7 @@ inline constexpr double kSettled = 0.3;
 inline constexpr double kLeastOutage = 2.0;
 
 /// The outages of a recorded drive, from the times at which an estimator accepted a position fix, in order. The error of one
-/// is that at its end, just before the next fix.
+/// is that 0.2 s before the next fix.
 std::vector<Outage> outages_between(const std::vector<int64_t>& accepted_us, double least_s = kLeastOutage);
 
 struct OutageError {
