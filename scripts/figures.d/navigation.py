@@ -7,6 +7,7 @@ import re
 import shutil
 import statistics
 
+import navigation_sensors
 from support import Skipped, root_mean_square
 
 SEEDS = 20
@@ -175,4 +176,5 @@ MEASUREMENTS = {
     "nees_pictures": nees_pictures,
     "frame_ms": frame_ms,
     "tunables": tunables,
+    **navigation_sensors.MEASUREMENTS,
 }

@@ -112,7 +112,7 @@ class Runs:
 
         def run():
             self.drive(drive)
-            path = self.folder("fleet", drive, *words)
+            path = self.folder("fleet", drive.strip("/").replace("/", "_"), *words)
             flags = [*(("--config", config) if config else ()), *(("--align", "=".join(align)) if align else ()), *(("--fit-latency",) if fit_latency else ())]
             self.roadfix("fleet", "run", drive, *words, "--root", self.shared / "data", "--stages", stages, *flags, "--keep", "errors", "--engine", "local",
                          "--out", path, "--overwrite")
@@ -126,11 +126,11 @@ class Runs:
         ((channels, _),) = self.recorded(stages, drive, *words, **options)
         return channels[channel]
 
-    def windows(self, channel, stages, drive, length, first, every, phases, *words):
+    def windows(self, channel, stages, drive, length, first, every, phases, *words, **options):
         """RMS of the horizontal errors at the ends of all outages of all phases, m; one drive of a fleet a phase."""
         cut = (f"cut_gnss_s={length}", f"every_s={every}", f"after_s={first}", f"phase_s={','.join(map(str, phases))}")
         ends = []
-        for phase, (channels, _) in zip(phases, self.recorded(stages, drive, *cut, *words)):
+        for phase, (channels, _) in zip(phases, self.recorded(stages, drive, *cut, *words, **options)):
             outages = channels[channel]["outages"]
             if outages["missing"]:
                 raise Skipped(f"{outages['missing']} outages of phase {phase} end without an estimate")
