@@ -53,6 +53,8 @@ void visit(WheelsCalibration& c, Visitor& v) {
   v.optional_number("rate_hz", c.rate, 0.01, kMaxRate);
   v.optional_number("speed_scale_std", c.speed_scale_std, 0.0, 1.0);
   v.optional_number("speed_noise_mps", c.speed_noise, 0.0, 10.0);
+  v.optional_number("yaw_rate_noise_radps", c.yaw_rate_noise, 0.0, 1.0);
+  v.optional_number("yaw_rate_bias_std_radps", c.yaw_rate_bias_std, 0.0, 1.0);
   v.optional_number("latency_std_s", c.latency_std, 0.0, kMaxSeconds);
   v.optional_number("track_width_m", c.track_width, 0.1, 10.0);
   v.optional_vector("lever_arm_body_m", c.lever_arm, -kMaxLength, kMaxLength);

@@ -46,6 +46,8 @@ struct WheelsCalibration {
   std::optional<double> rate;                ///< Hz
   std::optional<double> speed_scale_std;     ///< relative
   std::optional<double> speed_noise;         ///< m/s per sample
+  std::optional<double> yaw_rate_noise;      ///< rad/s per sample, of the car's own yaw rate
+  std::optional<double> yaw_rate_bias_std;   ///< rad/s, of the same
   std::optional<double> latency_std;         ///< s, by which speeds are older than their stamps
   std::optional<double> track_width;         ///< m
   std::optional<Eigen::Vector3d> lever_arm;  ///< m, p_body_axle: the rear axle's centre, on the ground

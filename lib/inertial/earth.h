@@ -1,5 +1,6 @@
 /// Gravity and Earth rotation in a level frame. At a WGS84 anchor (enu): normal gravity and the Earth's rate. Without
 /// an anchor (a local frame, z up): standard gravity and no rotation, because latitude and heading are unknown.
+/// Kinematic: neither, for motion that is given against the ground.
 ///
 /// Gravity is evaluated again only after a move of kGravityStep (its gradient is 3e-6 1/s2 along the vertical: 5e-5
 /// m/s2 at most), at points fixed by the path alone.
@@ -13,6 +14,11 @@ class Earth {
  public:
   Earth() = default;
   explicit Earth(const Geodetic& anchor);
+  [[nodiscard]] static Earth kinematic() {
+    Earth earth;
+    earth.gravity_.setZero();
+    return earth;
+  }
 
   [[nodiscard]] bool anchored() const { return anchored_; }
   [[nodiscard]] const Eigen::Vector3d& rate() const { return rate_; }  ///< rad/s, level frame

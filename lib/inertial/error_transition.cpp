@@ -6,12 +6,13 @@
 
 namespace roadfix::inertial {
 
-void TransitionSums::add(const Strapdown& x, const InertialStep& step, double gyro_density, double accel_density) {
+void TransitionSums::add(const Strapdown& x, const InertialStep& step, const ImuNoise& noise) {
   if (duration_ == 0.0) start_ = x;
   rate_ += step.dt * step.rate;
   force_ += step.dt * step.specific_force;
-  gyro_variance_ += step.dt * gyro_density * gyro_density;
-  accel_variance_ += step.dt * accel_density * accel_density;
+  gyro_variance_ += step.dt * noise.gyro * noise.gyro;
+  accel_variance_ += step.dt * noise.accel * noise.accel;
+  tilt_variance_ += step.dt * noise.tilt * noise.tilt;
   duration_ += step.dt;
 }
 
@@ -51,6 +52,8 @@ ErrorTransition TransitionSums::transition(const Strapdown& end, const Eigen::Ve
     Eigen::Matrix<double, 9, 3> B;
     B << I, V + t * G, X + t * V + 0.5 * t * t * G;
     Q.noalias() += 0.5 * gyro_variance_ * B.lazyProduct(B.transpose());
+    if (tilt_variance_ > 0.0)
+      Q.noalias() += 0.5 * tilt_variance_ * B.leftCols<2>().lazyProduct(B.leftCols<2>().transpose());
   }
   // (I.2.6): accelerometer noise.
   for (int i = 0; i < 3; ++i) {

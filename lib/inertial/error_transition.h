@@ -5,6 +5,7 @@
 /// unobservable directions.
 #pragma once
 
+#include "inertial/imu_noise.h"
 #include "inertial/strapdown.h"
 
 namespace roadfix::inertial {
@@ -31,7 +32,7 @@ struct ErrorTransition {
 class TransitionSums {
  public:
   /// `x` where the step begins.
-  void add(const Strapdown& x, const InertialStep& step, double gyro_density, double accel_density);
+  void add(const Strapdown& x, const InertialStep& step, const ImuNoise& noise);
   [[nodiscard]] double duration() const { return duration_; }
 
   /// `end`: the state now; p_ref: of the error; gravity: m/s2, level axes.
@@ -41,7 +42,7 @@ class TransitionSums {
   template <class Archive>
   void serialise(Archive& a) {
     a(duration_, start_.q_level_imu.coeffs(), start_.velocity, start_.position, rate_, force_, gyro_variance_,
-      accel_variance_);
+      accel_variance_, tilt_variance_);
   }
 
  private:
@@ -49,7 +50,7 @@ class TransitionSums {
   Strapdown start_;
   Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();   // rad, sum of rate dt
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();  // m/s, sum of specific force dt
-  double gyro_variance_ = 0.0, accel_variance_ = 0.0;
+  double gyro_variance_ = 0.0, accel_variance_ = 0.0, tilt_variance_ = 0.0;
 };
 
 }  // namespace roadfix::inertial

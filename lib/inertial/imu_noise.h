@@ -11,6 +11,7 @@ namespace roadfix::inertial {
 struct ImuNoise {
   double gyro = 0.0;   ///< rad/s/sqrt(Hz)
   double accel = 0.0;  ///< m/s2/sqrt(Hz)
+  double tilt = 0.0;   ///< rad/s/sqrt(Hz), of rates about the level axes that no gyro measures; an imu's have none
 };
 
 /// Density from second differences of means over `length` samples: a second difference of white noise has six times its

@@ -15,6 +15,7 @@ namespace roadfix::navigation {
 
 /// Facts of the sensors and of how they sit. A wide sigma says that something is to be estimated; zero: it is exact.
 struct VehicleFacts {
+  bool has_imu = true;  ///< false: the car's own motion drives the state, see without_imu()
   inertial::ImuNoise imu{1.0e-4, 1.0e-3};
   double gyro_bias_std = 1.0e-3;  ///< rad/s, at turn-on
   double accel_bias_std = 0.05;   ///< m/s2, at turn-on
@@ -32,6 +33,11 @@ struct VehicleFacts {
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero(), p_imu_antenna_std = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero(), p_imu_axle_std = Eigen::Vector3d::Zero();        ///< m
   std::optional<CameraFacts> camera;
+
+  /// One for each axis whose angular rate is measured.
+  [[nodiscard]] Eigen::Vector3d measured_rates() const {
+    return has_imu ? Eigen::Vector3d(1.0, 1.0, 1.0) : Eigen::Vector3d(0.0, 0.0, 1.0);
+  }
 };
 
 /// Latencies and clock offsets show only as differences, so one clock must define time: the better one by calibration,
@@ -69,6 +75,17 @@ struct ProcessNoise {
   double wheel_scale_walk = 1.3e-5;   ///< 1/sqrt(s): what a tyre that warms up grows in a minute, (N.4.3)
   double mounting_walk = 1.0e-5;      ///< rad/sqrt(s)
   double antenna_walk = 4.0e-3;       ///< m/sqrt(s): what the imu's cross axes make of turns
+};
+
+/// How a car moves that has no imu: what nothing measures is white noise of these densities.
+struct CarMotionConfig {
+  double acceleration_noise = 1.5;  ///< m/s2/sqrt(Hz): half a m/s2 to three, for one to a few seconds
+  double turn_noise = 0.3;      ///< rad/s/sqrt(Hz), without a yaw rate: a right angle in three seconds is three sigma
+  double turn_speed = 6.0;      ///< m/s, at which it is so; slower, a curve is as narrow and takes longer
+  double tilt_std = 0.04;       ///< rad, of roll and pitch: slopes of roads and lean in bends
+  double tilt_time = 10.0;      ///< s, for which they last
+  double level_interval = 1.0;  ///< s between two uses of the level road
+  double confirm_std = 0.17;    ///< rad, of a heading that a pose may be published with
 };
 
 /// Gates, floors and intervals of the sources.
@@ -112,6 +129,7 @@ struct StartConfig {
 struct NavigationTuning {
   SourceList sources;
   ProcessNoise process;
+  CarMotionConfig car;
   AidingConfig aiding;
   vehicle::NonholonomicConfig nonholonomic;
   GnssScreenConfig screen;
@@ -145,6 +163,17 @@ void visit(ProcessNoise& c, Visitor& v) {
   v.number("wheel_scale_walk_per_rts", c.wheel_scale_walk, 0.0, 1.0);
   v.number("mounting_walk_rad_per_rts", c.mounting_walk, 0.0, 1.0);
   v.number("antenna_walk_m_per_rts", c.antenna_walk, 0.0, 1.0);
+}
+
+template <class Visitor>
+void visit(CarMotionConfig& c, Visitor& v) {
+  v.number("acceleration_noise_mps2_per_rthz", c.acceleration_noise, 1e-3, 100.0);
+  v.number("turn_noise_radps_per_rthz", c.turn_noise, 1e-4, 10.0);
+  v.number("turn_speed_mps", c.turn_speed, 0.1, 100.0);
+  v.number("tilt_std_rad", c.tilt_std, 1e-4, 1.0);
+  v.number("tilt_time_s", c.tilt_time, 0.1, 1e4);
+  v.number("level_interval_s", c.level_interval, 0.05, 100.0);
+  v.number("confirm_std_rad", c.confirm_std, 1e-4, 1.6);
 }
 
 template <class Visitor>
@@ -189,6 +218,7 @@ template <class Visitor>
 void visit(NavigationTuning& c, Visitor& v) {
   v.group("sources", c.sources);
   v.group("process", c.process);
+  v.group("car", c.car);
   v.group("aiding", c.aiding);
   v.group("nonholonomic", c.nonholonomic);
   v.group("screen", c.screen);

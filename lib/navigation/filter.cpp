@@ -79,7 +79,7 @@ void integrate(Mean& x, inertial::InertialStep& last, BodyMotion& motion, inerti
 
 void Filter::predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise) {
   Mean& x = state_.x;
-  sums_.add(x.nav, x.corrected(imu.gyro, imu.accel, dt), noise.gyro, noise.accel);
+  sums_.add(x.nav, x.corrected(imu.gyro, imu.accel, dt), noise);
   integrate(x, last_, motion_, earth_, imu, dt);
   for (int i = 0; i < 3; ++i) x.gnss_bias(i) *= inertial::gauss_markov_decay(dt, gnss_bias_.position_time(i));
   x.gnss_velocity_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.velocity_time);
@@ -99,7 +99,7 @@ Filter::Diagonal Filter::diagonal(double T) const {
   const ProcessNoise& p = config_.process;
   // (N.2.4): the in-run part of biases and scales walks; what is beyond it is constant since turn-on.
   const double walk = 2.0 * T / v.correlation_s;
-  d.noise.segment<3>(kGyroBias).setConstant(walk * square(std::min(v.gyro_bias_std, p.gyro_drift_max)));
+  d.noise.segment<3>(kGyroBias) = walk * square(std::min(v.gyro_bias_std, p.gyro_drift_max)) * v.measured_rates();
   d.noise.segment<3>(kAccelBias).setConstant(walk * square(std::min(v.accel_bias_std, p.accel_drift_max)));
   d.noise.segment<6>(kGyroScale).setConstant(walk * square(v.scale_std));
   // What the calibration calls exact stays put.

@@ -6,6 +6,7 @@
 #include "geometry/frames.h"
 #include "geometry/so3.h"
 #include "navigation/input_adapter.h"
+#include "navigation/motion/road_level.h"
 #include "stream/state_bytes.h"
 
 namespace roadfix::navigation {
@@ -39,15 +40,53 @@ double prior_age(const VehicleFacts& v) {
 
 }  // namespace
 
-Navigation::Navigation(const NavigationConfig& config)
-    : config_(config),
-      aiding_(config),
+Navigation::Navigation(const NavigationConfig& config) : Navigation(config, true) {}
+
+Navigation::Navigation(const NavigationConfig& config, bool has_imu)
+    : given_(config),
+      config_(has_imu ? config : without_imu(config)),
+      aiding_(config_),
       screen_(config.screen),
-      imu_noise_(config.facts.imu),
-      alignment_(config),
-      lag_us_(lag_of(prior_age(config.facts))) {
-  if (config.sources.camera && config.facts.camera) camera_.emplace(config.camera, *config.facts.camera);
+      imu_noise_(config_.facts.imu),
+      car_(config_),
+      alignment_(config_),
+      lag_us_(lag_of(prior_age(config_.facts))) {
+  if (has_imu && config.sources.camera && config.facts.camera) camera_.emplace(config.camera, *config.facts.camera);
   records_.reserve(1024);
+}
+
+/// Begins anew with the other source of motion; what is known of the place and of an earlier drive stays.
+void Navigation::change_motion(bool has_imu) {
+  Navigation fresh(given_, has_imu);
+  if (alignment_.memory()) fresh.alignment_.recall(*alignment_.memory());
+  fresh.anchor_ = anchor_;
+  if (usable()) fresh.abandoned_ = SE3{filter()->state().x.nav.q_level_imu, filter()->state().x.nav.position};
+  fresh.screen_ = screen_;
+  fresh.reset_counter_ = reset_counter_;
+  fresh.reset_delta_ = reset_delta_;
+  fresh.records_.insert(fresh.records_.end(), records_.begin(), records_.end());
+  *this = std::move(fresh);
+}
+
+bool Navigation::goes_without_imu() {
+  if (!config_.facts.has_imu) return true;
+  if (local() || last_step_us_ != 0 || !ring_.empty() || bad_imu_ != 0) return false;
+  change_motion(false);
+  return true;
+}
+
+InputStatus Navigation::see(const WheelSample& wheels) {
+  // Speeds alone would leave every turn to the fixes, whose errors look like turns.
+  if (config_.facts.has_imu && !wheels.yaw_rate && wheels.num_speeds != 4) return InputStatus::kBadInput;
+  if (!goes_without_imu()) return InputStatus::kBadInput;
+  const bool taken = car_.add(wheels, [&](const ImuSample& s) { ring_.push(s); });
+  return taken ? InputStatus::kAccepted : InputStatus::kOutOfOrder;
+}
+
+InputStatus Navigation::see(int64_t t_us) {
+  if (config_.facts.has_imu) return InputStatus::kBadInput;
+  const bool taken = car_.pass(t_us, [&](const ImuSample& s) { ring_.push(s); });
+  return taken ? InputStatus::kAccepted : InputStatus::kOutOfOrder;
 }
 
 InputStatus Navigation::see(const ImuSample& imu) {
@@ -55,6 +94,7 @@ InputStatus Navigation::see(const ImuSample& imu) {
     ++bad_imu_;
     return InputStatus::kBadInput;
   }
+  if (!config_.facts.has_imu) change_motion(true);
   const int64_t newest = ring_.empty() ? last_step_us_ : ring_.back().t_us;
   if (imu.t_us <= newest) return InputStatus::kOutOfOrder;
   ring_.push(imu);
@@ -65,14 +105,28 @@ InputStatus Navigation::advance(const ImuSample& imu) {
   InputStatus status = InputStatus::kAccepted;
   const int64_t newest = ring_.empty() ? last_step_us_ : ring_.back().t_us;
   if (imu.t_us > newest) status = see(imu);
-  while (!ring_.empty() && ring_.front().t_us <= imu.t_us - lag_us_) {
-    step(ring_.front());
-    ring_.pop();
-  }
+  advance_to(imu.t_us);
   return status;
 }
 
+void Navigation::advance_to(int64_t t_us) {
+  while (!ring_.empty() && ring_.front().t_us <= t_us - lag_us_) {
+    step(ring_.front());
+    ring_.pop();
+  }
+}
+
 void Navigation::add(const GnssFix& fix, int64_t id) {
+  take(fix, id);
+  if (!config_.facts.has_imu && !car_.driven_by_wheels()) advance_to(fix.t_us);
+}
+
+void Navigation::add(const WheelSample& wheels, int64_t id) {
+  take(wheels, id);
+  if (!config_.facts.has_imu) advance_to(wheels.t_us);
+}
+
+void Navigation::take(const GnssFix& fix, int64_t id) {
   const bool again = fix.t_us == last_fix_us_ && fix.antenna.latitude == last_fix_.latitude &&
                      fix.antenna.longitude == last_fix_.longitude && fix.antenna.height == last_fix_.height;
   const AidingStatus screened = again ? AidingStatus::kBadInput : screen_.check(fix);
@@ -87,7 +141,7 @@ void Navigation::add(const GnssFix& fix, int64_t id) {
     if (q) queue_.push(*q);
 }
 
-void Navigation::add(const WheelSample& wheels, int64_t id) {
+void Navigation::take(const WheelSample& wheels, int64_t id) {
   if (!config_.sources.wheel_speed) return;
   const std::optional<Queued> q = queued(wheels, id, config_);
   if (!q) return note(record_of(AidingSource::kWheelSpeed, AidingStatus::kBadInput, wheels.t_us, id));
@@ -125,11 +179,13 @@ void Navigation::forget_before(int64_t t_us) {
   });
 }
 
-inertial::ImuNoise Navigation::noise_over(double dt) const {
+inertial::ImuNoise Navigation::noise_over(int64_t t_us, double dt) const {
+  if (!config_.facts.has_imu)
+    return car_.noise(t_us, filter() == nullptr ? 0.0 : filter()->state().x.nav.velocity.norm());
   inertial::ImuNoise noise = imu_noise_.noise();
   // White noise that over this time does what an unseen manoeuvre may do, (N.2.6).
   if (dt > config_.process.max_gap || imu_noise_.frozen())
-    noise = {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt)};
+    noise = {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt), 0.0};
   if (imu_noise_.gyro_clipped()) noise.gyro = kBridgeRate * std::sqrt(kClipTime);
   return noise;
 }
@@ -142,7 +198,7 @@ void Navigation::step(const ImuSample& imu) {
   const bool gap = dt > config_.process.max_gap;
   bool block_done = false;
   if (!gap) {
-    imu_noise_.add(imu, dt);
+    if (config_.facts.has_imu) imu_noise_.add(imu, dt);
     block_done = standstill_.add(imu, dt, imu_noise_.noise(), imu_noise_.frozen());
   } else {
     ++gaps_;
@@ -154,7 +210,7 @@ void Navigation::step(const ImuSample& imu) {
   const bool turned = kBridgeRate * dt > 2.0 * config_.start.heading_std;
   if (dt > kRealignGap || (turned && moved_meanwhile(dt))) align_again();
   if (phase_ == Phase::kDone) {
-    filter_->predict(imu, dt, noise_over(dt));
+    filter_->predict(imu, dt, noise_over(imu.t_us, dt));
     step_aligned(imu, block_done);
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == Phase::kHeading) {
@@ -177,7 +233,7 @@ void Navigation::step(const ImuSample& imu) {
 
 void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) {
   HeadingHypotheses& all = alignment_.hypotheses();
-  all.predict(imu, dt, noise_over(dt));
+  all.predict(imu, dt, noise_over(imu.t_us, dt));
   const auto mean = [&]() -> const Mean& { return all.leader().state().x; };
   queue_.take_due(mean, [&](const Queued& q) {
     note(all.aid([&](Filter& f) { return aiding_.try_on(f, q); }), q.id);
@@ -189,7 +245,12 @@ void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) 
   for (const int axis : {1, 2})
     if (aiding_.nonholonomic().due(axis, imu.t_us))
       note(all.aid([&](Filter& f) { return aiding_.nonholonomic().try_on(f, axis); }));
-  if (block_done && aiding_.zero_motion().standing(all.leader(), standstill_, imu_noise_.frozen())) {
+  if (!config_.facts.has_imu && car_.level_due(imu.t_us)) {
+    const double open = Gates::open().nis[2], sigma = car_.level_std();
+    (void)all.aid(
+        [&](Filter& f) { return f.fuse(AidingSource::kNonholonomic, imu.t_us, road_level(f.state(), sigma), open); });
+  }
+  if (standing(all.leader(), block_done)) {
     note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_velocity(f, false); }));
     note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_rate(f, standstill_.block(), false); }));
   }
@@ -255,11 +316,21 @@ void Navigation::step_aligned(const ImuSample& imu, bool block_done) {
     for (const int axis : {1, 2})
       if (aiding_.nonholonomic().due(axis, imu.t_us)) note(aiding_.nonholonomic().use(filter, axis, learn));
   }
-  if (block_done && aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen())) {
+  if (!config_.facts.has_imu && car_.level_due(imu.t_us))
+    (void)filter.fuse(AidingSource::kNonholonomic, imu.t_us, road_level(filter.state(), car_.level_std()),
+                      Gates::open().nis[2]);
+  if (standing(filter, block_done)) {
     note(aiding_.zero_motion().use_velocity(filter, true));
     note(aiding_.zero_motion().use_rate(filter, standstill_.block(), true));
   }
   if (camera_) use_pictures(imu.t_us);
+}
+
+bool Navigation::standing(const Filter& filter, bool block_done) const {
+  if (!block_done) return false;
+  if (!config_.facts.has_imu)
+    return config_.sources.zero_motion && car_.standing(filter.state().x.t_us, standstill_.block().duration);
+  return aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen());
 }
 
 void Navigation::use_pictures(int64_t t_us) {
@@ -336,7 +407,7 @@ void Navigation::rebase_predictor() {
     }
     predictor_stale_ = false;
   }
-  predictor_->carry(ring_, [&](double dt) { return noise_over(dt); });
+  predictor_->carry(ring_, [&](int64_t t_us, double dt) { return noise_over(t_us, dt); });
 }
 
 void Navigation::recall(const Memory& memory) {
@@ -344,7 +415,7 @@ void Navigation::recall(const Memory& memory) {
 }
 
 std::optional<Memory> Navigation::memory() const {
-  if (phase_ != Phase::kDone || !anchor_) return std::nullopt;
+  if (phase_ != Phase::kDone || !anchor_ || !config_.facts.has_imu) return std::nullopt;
   constexpr double kParkedSigma = 10.0;  // m; a place known worse is not worth keeping
   const EnuAnchor enu(*anchor_);
   const State& s = filter_->state();
@@ -362,7 +433,7 @@ template <class Archive>
 void Navigation::serialise(Archive& a) {
   serialise_optional(
       a, anchor_, [] { return Geodetic(); }, [&](Geodetic& g) { a(g.latitude, g.longitude, g.height); });
-  const inertial::Earth earth = anchor_ ? inertial::Earth(*anchor_) : inertial::Earth();
+  const inertial::Earth earth = earth_of(config_, anchor_);
   serialise_optional(
       a, filter_, [&] { return Filter(config_, earth, camera_.has_value()); }, [&](Filter& f) { f.serialise(a); });
   serialise_optional(
@@ -373,6 +444,7 @@ void Navigation::serialise(Archive& a) {
   screen_.serialise(a);
   imu_noise_.serialise(a);
   standstill_.serialise(a);
+  car_.serialise(a);
   ring_.serialise(a);
   local_start_.serialise(a);
   queue_.serialise(a);
@@ -386,14 +458,18 @@ void Navigation::serialise(Archive& a) {
 
 std::vector<uint8_t> Navigation::save() const {
   StateArchiveOut writer;
+  bool has_imu = config_.facts.has_imu;
+  writer(has_imu);
   // The writer only reads: serialise() is one list for both directions and so cannot be const.
   const_cast<Navigation*>(this)->serialise(writer);
   return writer.out.take();
 }
 
 void Navigation::load(std::span<const uint8_t> bytes) {
-  Navigation fresh(config_);
   StateArchiveIn reader{StateReader(bytes)};
+  bool has_imu = true;
+  reader(has_imu);
+  Navigation fresh(given_, has_imu);
   fresh.serialise(reader);
   reader.in.finish();
   *this = std::move(fresh);

@@ -6,6 +6,9 @@
 /// Time: inputs come in the order of their stamps as the caller's horizon passes them (advance, add); see() hands in
 /// the newest imu sample ahead of the horizon, and output() is for that one. The state stays behind the horizon by the
 /// longest latency that is possible yet, so that every measurement is used at its own moment.
+/// Without an imu the car's own motion drives the state (motion/car_motion.h): see() of wheel samples, or of the time
+/// alone, and add() take the place of see() and advance() of imu samples, and imu axes are the vehicle's. It begins so
+/// where see() is called before the first imu sample; with that one it begins again.
 /// Guarantees: same inputs in the same order give the same bits; no allocation once aligned; one thread.
 #pragma once
 
@@ -20,6 +23,7 @@
 #include "navigation/aiding/gnss_screen.h"
 #include "navigation/initialisation/alignment.h"
 #include "navigation/initialisation/local_start.h"
+#include "navigation/motion/car_motion.h"
 #include "navigation/output_predictor.h"
 
 namespace roadfix::navigation {
@@ -53,8 +57,11 @@ class Navigation {
  public:
   explicit Navigation(const NavigationConfig& config);
 
-  InputStatus see(const ImuSample& imu);      ///< newest sample, ahead of the horizon
-  InputStatus advance(const ImuSample& imu);  ///< the horizon has passed this sample
+  InputStatus see(const ImuSample& imu);       ///< newest sample, ahead of the horizon
+  InputStatus advance(const ImuSample& imu);   ///< the horizon has passed this sample
+  InputStatus see(const WheelSample& wheels);  ///< newest sample, where no imu is; the first must tell a yaw rate
+  InputStatus see(int64_t t_us);               ///< newest time, where such wheels have fallen silent
+  [[nodiscard]] bool has_imu() const { return config_.facts.has_imu; }
   void add(const GnssFix& fix, int64_t id = 0);
   void add(const WheelSample& wheels, int64_t id = 0);
   void add(const MagSample& mag, int64_t id = 0);
@@ -82,6 +89,12 @@ class Navigation {
   void load(std::span<const uint8_t> bytes);
 
  private:
+  Navigation(const NavigationConfig& config, bool has_imu);
+  [[nodiscard]] bool goes_without_imu();
+  void change_motion(bool has_imu);
+  void advance_to(int64_t t_us);
+  void take(const GnssFix& fix, int64_t id);
+  void take(const WheelSample& wheels, int64_t id);
   void step(const ImuSample& imu);
   void step_aligned(const ImuSample& imu, bool block_done);
   void step_heading(const ImuSample& imu, double dt, bool block_done);
@@ -93,7 +106,8 @@ class Navigation {
   void end_alignment();
   void note(AidingRecord record, int64_t id = 0);
   void forget_before(int64_t t_us);
-  [[nodiscard]] inertial::ImuNoise noise_over(double dt) const;
+  [[nodiscard]] inertial::ImuNoise noise_over(int64_t t_us, double dt) const;
+  [[nodiscard]] bool standing(const Filter& filter, bool block_done) const;
   [[nodiscard]] bool usable() const;
   /// No GNSS is to be used: the frame is local.
   [[nodiscard]] bool local() const {
@@ -107,11 +121,12 @@ class Navigation {
   template <class Archive>
   void serialise(Archive& a);
 
-  NavigationConfig config_;
+  NavigationConfig given_, config_;  ///< the second as it is used, with or without an imu
   Aiding aiding_;
   GnssScreen screen_;
   inertial::ImuNoiseEstimator imu_noise_;
   inertial::StandstillDetector standstill_;
+  CarMotion car_;
   inertial::ImuRing ring_;
   MeasurementQueue queue_;
   Alignment alignment_;

@@ -25,7 +25,7 @@ void OutputPredictor::begin(const Filter& filter, int64_t ring_index) {
 }
 
 void OutputPredictor::add(const ImuSample& imu, double dt, const inertial::ImuNoise& noise) {
-  sums_.add(x_.nav, x_.corrected(imu.gyro, imu.accel, dt), noise.gyro, noise.accel);
+  sums_.add(x_.nav, x_.corrected(imu.gyro, imu.accel, dt), noise);
   integrate(x_, last_, motion_, earth_, imu, dt);
 }
 

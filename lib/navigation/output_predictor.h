@@ -15,13 +15,13 @@ class OutputPredictor {
   [[nodiscard]] bool begun() const { return begun_; }
   void clear() { begun_ = false; }
 
-  /// Moves over the samples of the ring from where it is; `noise(dt)`: densities over a sample.
+  /// Moves over the samples of the ring from where it is; `noise(t_us, dt)`: densities over a sample.
   template <class Noise>
   void carry(const inertial::ImuRing& ring, const Noise& noise) {
     for (; next_ < ring.end(); ++next_) {
       const ImuSample& s = ring[next_];
       const double dt = seconds_between(x_.t_us, s.t_us);
-      if (dt > 0.0) add(s, dt, noise(dt));
+      if (dt > 0.0) add(s, dt, noise(s.t_us, dt));
     }
   }
   [[nodiscard]] int64_t next() const { return next_; }

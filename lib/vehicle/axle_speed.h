@@ -10,6 +10,7 @@ struct WheelFacts {
   double speed_noise = 0.05;     ///< m/s, of each speed
   double track_width = 1.5;      ///< m, between the rear wheels
   double yaw_rate_noise = 0.01;  ///< rad/s, of the car's own yaw rate
+  double yaw_rate_bias = 0.003;  ///< rad/s, sigma of its offset: cars null it where they stand (assumed)
 };
 
 struct AxleSpeed {

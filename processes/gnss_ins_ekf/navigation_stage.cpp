@@ -60,8 +60,9 @@ class NavigationStage final : public Stage {
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
     if (filter_config_.sources.camera && filter_config_.facts.camera)
       spec_.inputs.push_back({"VO_FEATURES", "vo_features2_t", kTracksLateness_us, 0});
-    spec_.state_layout = 17;
-    spec_.clocks = {{kImu, 200'000}};
+    spec_.state_layout = 18;
+    // A car without an IMU is driven by its wheels.
+    spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
 
@@ -90,9 +91,14 @@ class NavigationStage final : public Stage {
     }
   }
 
-  void on_clock(const Message& m) override { (void)filter_->see(imu_sample(decode<imu_t>(m.bytes))); }
+  void on_clock(const Message& m) override {
+    if (m.input == kImu) (void)filter_->see(imu_sample(decode<imu_t>(m.bytes)));
+    if (m.input == kWheels) (void)filter_->see(wheel_sample(decode<wheels_t>(m.bytes)));
+    waits_for_imu_ = m.input != kImu && filter_->has_imu();
+  }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
+    if (waits_for_imu_) return;
     for (const navigation::AidingRecord& record : filter_->records()) {
       aiding_t message = aiding(record);
       outputs.publish(kAiding, message);
@@ -150,7 +156,7 @@ class NavigationStage final : public Stage {
     navigation::NavigationOutput output = filter_->output();
     if (output.odometry.t_us >= now_utime || output.odometry.validity == Validity::kInvalid) return output;
     output.odometry.validity = Validity::kInvalid;
-    output.reason = "the newest IMU samples are unusable";
+    output.reason = "the newest samples are unusable";
     return output;
   }
 
@@ -174,6 +180,7 @@ class NavigationStage final : public Stage {
   StageSpec spec_;
   std::optional<navigation::Navigation> filter_;
   PublishSlot pose_slot_, status_slot_;
+  bool waits_for_imu_ = false;  // this tick came from another clock
 };
 
 }  // namespace
@@ -225,6 +232,8 @@ navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
     take_known(wheels->speed_noise, v.wheels.speed_noise);
     v.wheel_latency_std = wheels->latency_std.value_or(kUnknownWheelLatency);
     take_known(wheels->track_width, v.wheels.track_width);
+    take_known(wheels->yaw_rate_noise, v.wheels.yaw_rate_noise);
+    take_known(wheels->yaw_rate_bias_std, v.wheels.yaw_rate_bias);
   }
   const PlaceOnVehicle antenna = calibration.antenna(), axle = calibration.rear_axle();
   v.p_imu_antenna = antenna.p;

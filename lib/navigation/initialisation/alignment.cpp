@@ -3,6 +3,8 @@
 #include <array>
 #include <tuple>
 
+#include "navigation/motion/car_motion.h"
+
 namespace roadfix::navigation {
 
 namespace {
@@ -35,15 +37,23 @@ bool Alignment::try_start(int64_t t_us, const inertial::StandstillDetector& stan
   const StartParked parked;
   const std::array<const StartStrategy*, 2> strategies = {&with_fixes, &parked};
   const std::optional<EnuAnchor> enu = anchor ? std::optional(EnuAnchor(*anchor)) : std::nullopt;
-  const StartContext context{config_, t_us,        standstill, enu ? &*enu : nullptr,
-                             fix_,    fix_before_, memory_,    seconds_between(first_us_, t_us)};
+  // What an imu has left is none of a car without.
+  const std::optional<Memory> nothing;
+  const StartContext context{config_,
+                             t_us,
+                             standstill,
+                             enu ? &*enu : nullptr,
+                             fix_,
+                             fix_before_,
+                             config_.facts.has_imu ? memory_ : nothing,
+                             seconds_between(first_us_, t_us)};
   for (const StartStrategy* strategy : strategies) {
     std::optional<StartState> start = strategy->attempt(context);
     if (!start) continue;
     parked_ = strategy == &parked;
     if (parked_) anchor = memory_->place;
     start->bias_std = bias_std;
-    hypotheses_.start(inertial::Earth(*anchor), *start);
+    hypotheses_.start(earth_of(config_, anchor), *start);
     return true;
   }
   return false;

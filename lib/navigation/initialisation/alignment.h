@@ -3,6 +3,7 @@
 #pragma once
 
 #include "navigation/initialisation/heading_hypotheses.h"
+#include "navigation/motion/car_motion.h"
 #include "navigation/serialise_optional.h"
 
 namespace roadfix::navigation {
@@ -35,7 +36,7 @@ class Alignment {
 
   template <class Archive>
   void serialise(Archive& a, const std::optional<Geodetic>& anchor) {
-    hypotheses_.serialise(a, anchor ? inertial::Earth(*anchor) : inertial::Earth());
+    hypotheses_.serialise(a, earth_of(config_, anchor));
     for (std::optional<GnssFix>* fix : {&fix_, &fix_before_})
       serialise_optional(
           a, *fix, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });

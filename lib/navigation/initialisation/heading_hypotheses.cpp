@@ -9,6 +9,7 @@
 #include "navigation/aiding/gnss_position/gnss_position_model.h"
 #include "navigation/aiding/heading_rows.h"
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
+#include "navigation/motion/road_level.h"
 
 namespace roadfix::navigation {
 
@@ -35,7 +36,7 @@ BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double y
   std.segment<3>(kAtt) << kStartTilt, kStartTilt, yaw_std;
   std.segment<3>(kVel).setConstant(kStartVelocity);
   std.segment<3>(kPos).setConstant(s.local ? kLocalPlace : kStartPosition);
-  std.segment<3>(kGyroBias).setConstant(v.gyro_bias_std);
+  std.segment<3>(kGyroBias) = v.gyro_bias_std * v.measured_rates();
   std.segment<3>(kAccelBias).setConstant(v.accel_bias_std);
   std.segment<6>(kGyroScale).setConstant(v.scale_std);
   std(kWheelScale) = v.wheel_scale_std;
@@ -109,9 +110,13 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   // Using what the mean came from as measurements gives every correlation: tilt with accelerometer bias, position with
   // attitude through the lever arm, velocity in level axes with the heading.
   const double open = Gates::open().nis[3];
-  const Eigen::Vector3d gravity = filter.earth().gravity(x.nav.position);
-  (void)filter.fuse(AidingSource::kZeroVelocity, s.t_us, levelling(filter.state(), s.mean_accel, gravity, s.accel_std),
-                    open);
+  if (config_.facts.has_imu) {
+    const Eigen::Vector3d gravity = filter.earth().gravity(x.nav.position);
+    (void)filter.fuse(AidingSource::kZeroVelocity, s.t_us,
+                      levelling(filter.state(), s.mean_accel, gravity, s.accel_std), open);
+  } else {
+    (void)filter.fuse(AidingSource::kZeroVelocity, s.t_us, road_level(filter.state(), config_.car.tilt_std), open);
+  }
   Measurement<3> velocity;
   velocity.residual = s.velocity - filter.state().x.nav.velocity;
   velocity.H.block<3, 3>(0, kVel).setIdentity();

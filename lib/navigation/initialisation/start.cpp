@@ -60,7 +60,7 @@ StartState standing_start(const StartContext& c) {
   s.t_us = c.t_us;
   s.standing = true;
   s.mean_gyro = b.gyro;
-  s.mean_accel = b.accel;
+  s.mean_accel = c.config.facts.has_imu ? b.accel : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   s.accel_std = kStandingAccel;
   s.velocity_std = kStandingVelocity;
   s.memory = c.memory;

@@ -202,6 +202,10 @@ Calibration calibration_of(const SimulatedDrive& drive) {
     c.sensors.wheels->rate = wheels.rate_hz;
     c.sensors.wheels->speed_scale_std = std::hypot(wheels.speed_scale_std, wheels.wheel_scale_std);
     c.sensors.wheels->speed_noise = wheels.speed_noise_mps;
+    if (wheels.has_yaw_rate) {
+      c.sensors.wheels->yaw_rate_noise = wheels.yaw_rate_noise_radps;
+      c.sensors.wheels->yaw_rate_bias_std = wheels.yaw_rate_bias_std_radps;
+    }
     c.sensors.wheels->latency_std = clock_error_s(wheels.link, config.duration_s);
     c.sensors.wheels->track_width = wheels.track_width_m;
     // Who has moved the imu has measured by how much.

@@ -46,8 +46,10 @@ Strapdown perturbed(const Start& s, const Errors& d) {
   return x;
 }
 
+constexpr ImuNoise kNoise{1e-2, 1e-1};
+
 /// True minus estimated sensor errors `d`: what the estimate would have used less what is true.
-Strapdown moved(const Start& s, const Errors& d, TransitionSums* sums = nullptr) {
+Strapdown moved(const Start& s, const Errors& d, TransitionSums* sums = nullptr, const ImuNoise& noise = kNoise) {
   Strapdown x = perturbed(s, d);
   Earth earth(kAnchor);
   InertialStep last;
@@ -58,7 +60,7 @@ Strapdown moved(const Start& s, const Errors& d, TransitionSums* sums = nullptr)
                 s.rate.cwiseProduct(Eigen::Vector3d(d.segment<3>(kGyroScale)));
     step.specific_force = s.force - Eigen::Vector3d(d.segment<3>(kAccelBias)) -
                           s.force.cwiseProduct(Eigen::Vector3d(d.segment<3>(kAccelScale)));
-    if (sums != nullptr) sums->add(x, step, 1e-2, 1e-1);
+    if (sums != nullptr) sums->add(x, step, noise);
     mechanise(x, last, step, earth);
     last = step;
   }
@@ -114,14 +116,14 @@ TEST_CASE("a turn about gravity stays a turn about gravity, but for the Earth's 
   CHECK((local.F * roll - roll.head<9>()).norm() > 0.1);  // teeth: a tilt shows in gravity
 }
 
-TEST_CASE("the noise of a step is what drawn samples show") {
+/// Covariance of a step's errors that noise of these densities makes.
+Matrix9d drawn_noise(const Start& s, const Strapdown& end, const ImuNoise& noise) {
   std::mt19937 rng(7);
   std::normal_distribution<double> n;
-  const Start s = random_start(rng);
-  TransitionSums sums;
-  const Strapdown end = moved(s, Errors::Zero(), &sums);
+  const auto v = [&](double density) -> Eigen::Vector3d {
+    return (density / std::sqrt(kDt)) * Eigen::Vector3d(n(rng), n(rng), n(rng));
+  };
   Earth earth(kAnchor);
-  const Matrix9d Q = sums.transition(end, s.p_ref, earth.gravity(end.position), earth.rate()).Q;
   constexpr int kDraws = 4000;
   Matrix9d seen = Matrix9d::Zero();
   for (int draw = 0; draw < kDraws; ++draw) {
@@ -130,25 +132,39 @@ TEST_CASE("the noise of a step is what drawn samples show") {
     for (int i = 0; i < kSteps; ++i) {
       InertialStep step;
       step.dt = kDt;
-      const auto v = [&](double density) -> Eigen::Vector3d {
-        return (density / std::sqrt(kDt)) * Eigen::Vector3d(n(rng), n(rng), n(rng));
-      };
-      step.rate = s.rate + v(1e-2);
-      step.specific_force = s.force + v(1e-1);
+      const Eigen::Vector3d tilting = v(noise.tilt).cwiseProduct(Eigen::Vector3d(1.0, 1.0, 0.0));
+      step.rate = s.rate + v(noise.gyro) + x.q_level_imu.conjugate() * tilting;
+      step.specific_force = s.force + v(noise.accel);
       mechanise(x, last, step, earth);
       last = step;
     }
     const Vector9d e = error_between(end, x, s.p_ref);
     seen += e * e.transpose() / kDraws;
   }
-  // Whitened by Q the drawn covariance is the identity; a Wishart of 4000 draws is within 0.1 of it.
+  return seen;
+}
+
+/// Whitened by Q the drawn covariance is the identity: the largest difference.
+double off(const Matrix9d& Q, const Matrix9d& drawn) {
   const Eigen::LLT<Matrix9d> llt(Q + 1e-14 * Matrix9d::Identity());
   const Matrix9d L = llt.matrixL();
-  const auto off = [&](const Matrix9d& drawn) {
-    const Matrix9d half = L.triangularView<Eigen::Lower>().solve(drawn);
-    const Matrix9d white = L.triangularView<Eigen::Lower>().solve(half.transpose());
-    return (white.topLeftCorner<6, 6>() - Eigen::Matrix<double, 6, 6>::Identity()).cwiseAbs().maxCoeff();
-  };
-  CHECK(off(seen) < 0.15);
-  CHECK(off(1.4 * seen) > 0.15);  // teeth
+  const Matrix9d half = L.triangularView<Eigen::Lower>().solve(drawn);
+  const Matrix9d white = L.triangularView<Eigen::Lower>().solve(half.transpose());
+  return (white.topLeftCorner<6, 6>() - Eigen::Matrix<double, 6, 6>::Identity()).cwiseAbs().maxCoeff();
+}
+
+TEST_CASE("the noise of a step is what drawn samples show") {
+  std::mt19937 rng(7);
+  const Start s = random_start(rng);
+  for (const ImuNoise& noise : {kNoise, ImuNoise{1e-2, 1e-1, 2e-2}}) {
+    CAPTURE(noise.tilt);
+    TransitionSums sums;
+    const Strapdown end = moved(s, Errors::Zero(), &sums, noise);
+    Earth earth(kAnchor);
+    const Matrix9d Q = sums.transition(end, s.p_ref, earth.gravity(end.position), earth.rate()).Q;
+    const Matrix9d seen = drawn_noise(s, end, noise);
+    CHECK(off(Q, seen) < 0.15);        // a Wishart of 4000 draws is within 0.1
+    CHECK(off(Q, 1.4 * seen) > 0.15);  // teeth
+    if (noise.tilt > 0.0) CHECK(off(Q, drawn_noise(s, end, kNoise)) > 0.15);
+  }
 }

@@ -10,6 +10,7 @@
 #include "navigation/aiding/wheel_speed/wheel_speed_model.h"
 #include "navigation/aiding/wheel_yaw_rate/wheel_yaw_rate_model.h"
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
+#include "navigation/motion/road_level.h"
 #include "random_state.h"
 #include "support/numerical_jacobian.h"
 
@@ -114,6 +115,10 @@ TEST_CASE("standstill Jacobians") {
   check_everywhere<3>([](const State& s, const BodyMotion&) {
     return levelling(s, Eigen::Vector3d(0.0, 0.0, 9.8), Eigen::Vector3d(0.0, 0.0, -9.8), 0.1);
   });
+}
+
+TEST_CASE("level road Jacobian") {
+  check_everywhere<2>([](const State& s, const BodyMotion&) { return road_level(s, 0.05); });
 }
 
 TEST_CASE("velocity rows leave the heading unobserved, and one with phi would not") {

@@ -43,7 +43,7 @@ Eigen::Vector3d return_variance() { return Eigen::Vector3d(kReturnLevel, kReturn
 }  // namespace
 
 GnssPositionControl::GnssPositionControl(const NavigationConfig& config)
-    : config_(config), gates_(config.aiding.gate_sigma) {
+    : config_(config), gates_(config.aiding.gate_sigma), open_(Gates::open()) {
   for (Receiver& r : receivers_) r.lasting_share = config.aiding.lasting_errors ? kCodeShare : 0.0;
   if (config.aiding.lasting_errors) receivers_[static_cast<size_t>(FixType::kRtkFixed)].lasting_share = kPhaseShare;
 }
@@ -102,8 +102,49 @@ AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) cons
   return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
 
+/// (N.5.12): errors of Student's t. What a fix misses by beyond its noise widens that noise and the Gauss-Markov error by
+/// the weight of the scale mixture, (nu + m) / (nu + d); no gate, and the next fix may be off by the same.
+AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias) {
+  bias.stationary_std *= std::sqrt(error_time_.variance_factor());
+  bias.std *= std::sqrt(error_time_.variance_factor());
+  AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), open_.nis[3]);
+  if (r.status != AidingStatus::kAccepted) return r;
+  const double wider = std::max(1.0, (kTailFreedom + r.nis) / (kTailFreedom + r.dof));
+  filter.flush();
+  const double spread = filter.state().P().block<2, 2>(kPos, kPos).trace();
+  if (last_place_) {
+    way_ += filter.state().x.nav.position.head<2>() - *last_place_;
+    way_std_ += std::sqrt(std::max(0.5 * (spread - last_spread_), 0.0));
+  }
+  const Eigen::Vector2d variance = receiver(fix.fix_type).scale.variance_factor() * fix.cov.diagonal().head<2>();
+  if (config_.aiding.lasting_errors)
+    error_time_.add(fix.t_us, fix.value.head<2>() - way_, variance.cwiseSqrt(), way_std_);
+  set_bias(filter, bias);
+  filter.gnss_bias().position_time.head<2>().setConstant(error_time_.time());
+  for (int i = 0; i < 3 && wider > 1.0; ++i) {
+    BaseVector d = BaseVector::Zero();
+    d(kGnssBias + i) = std::sqrt(wider - 1.0) * bias.stationary_std(i);
+    filter.widen(d);
+  }
+  Bias now = bias;
+  now.anew = false;
+  Measurement<3> m = measurement(filter, fix, now);
+  m.R *= wider;
+  (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, m, open_.nis[3]);
+  last_place_ = filter.state().x.nav.position.head<2>();
+  last_spread_ = filter.state().P().block<2, 2>(kPos, kPos).trace();
+  r.nis /= wider;
+  learn(fix, r);
+  tried(fix);
+  used_at_us_ = fix.t_us;
+  return r;
+}
+
 AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   Bias bias = bias_of(fix);
+  if (heavy_tailed(fix.fix_type)) return use_heavy_tailed(filter, fix, bias);
+  last_place_.reset();
+  error_time_.clear();
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
   if (displaced() && r.status != AidingStatus::kBadInput) {
     if (is_back(filter, fix, bias, r.log_likelihood)) {

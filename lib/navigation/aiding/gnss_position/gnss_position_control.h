@@ -9,8 +9,10 @@
 #include <array>
 
 #include "navigation/aiding/gates.h"
+#include "navigation/aiding/gnss_position/error_time.h"
 #include "navigation/aiding/noise_scale.h"
 #include "navigation/measurement_queue.h"
+#include "navigation/serialise_optional.h"
 
 namespace roadfix::navigation {
 
@@ -54,7 +56,10 @@ class GnssPositionControl {
       a(r.lasting_share, r.last_whitened);
     }
     a(used_at_us_, tried_at_us_, last_type_, rejected_, rejected_since_us_, displaced_since_us_, back_, first_off_,
-      height_displaced_);
+      height_displaced_, way_, way_std_, last_spread_);
+    error_time_.serialise(a);
+    serialise_optional(
+        a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
   }
 
  private:
@@ -75,6 +80,11 @@ class GnssPositionControl {
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
   void set_bias(Filter& filter, const Bias& bias) const;
+  /// A code receiver without an imu beside it: nothing but other fixes could tell an outlier.
+  [[nodiscard]] bool heavy_tailed(FixType type) const {
+    return !config_.facts.has_imu && type != FixType::kRtkFixed && type != FixType::kRtkFloat;
+  }
+  AidingRecord use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias);
   AidingRecord use_level(Filter& filter, const Queued& fix, const Bias& bias);
   AidingRecord decide(Filter& filter, const Queued& fix, const Bias& bias, const AidingRecord& rejected);
   bool is_back(Filter& filter, const Queued& fix, const Bias& bias, double log_likelihood);
@@ -83,7 +93,7 @@ class GnssPositionControl {
   void learn(const Queued& fix, const AidingRecord& r);
 
   NavigationConfig config_;
-  Gates gates_;
+  Gates gates_, open_;
   std::array<Receiver, 6> receivers_;  // by FixType
   int64_t used_at_us_ = 0, tried_at_us_ = 0;
   FixType last_type_ = FixType::kNone;
@@ -92,6 +102,10 @@ class GnssPositionControl {
   double back_ = 0.0;                                    // logarithm of the odds that it is no longer displaced
   Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();  // innovation of the first of them
   bool height_displaced_ = false;
+  ErrorTime error_time_;                           // of code receivers
+  Eigen::Vector2d way_ = Eigen::Vector2d::Zero();  // m, gone without what fixes have corrected
+  double way_std_ = 0.0, last_spread_ = 0.0;   // m, grown with the way; m2, variance of the place after the last fix
+  std::optional<Eigen::Vector2d> last_place_;  // m, after the last of them
 };
 
 }  // namespace roadfix::navigation
