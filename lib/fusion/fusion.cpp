@@ -119,7 +119,10 @@ void Fusion::judge() {
   };
   const bool witnesses_count = !channel(kVo).on_trial() && !channel(kWheel).on_trial();
   const bool agree = witnesses_.agreement(kVo, kWheel) == WitnessAgreement::kAgree;
-  const bool ins_bad = witnesses_count && contradict(kIns, kVo) && contradict(kIns, kWheel) && agree;
+  // Fixes that are back after an outage may correct it by more than it claims, and be displaced themselves for a while.
+  const double returned = failover_.gnss_for(t_us_);
+  const bool settles = failover_.gnss() && returned < Witnesses::kLong * Witnesses::kSpacing;
+  const bool ins_bad = witnesses_count && !settles && contradict(kIns, kVo) && contradict(kIns, kWheel) && agree;
   const bool wheel_bad = contradict(kIns, kWheel) && !ins_bad;
   const bool vo_bad = (contradict(kIns, kVo) && !ins_bad) || (contradict(kVo, kWheel) && !wheel_bad);
   const auto alone = [&](FusionChannel c) {
