@@ -27,7 +27,6 @@ constexpr double kParkedYaw = 0.3 * kDegree;
 constexpr double kNegligible = 1e-9;  // share of a hypothesis that is dropped
 constexpr double kSameHeading = 15.0 * kDegree;
 constexpr double kStartPosition = 1000.0, kStartVelocity = 100.0, kStartTilt = 0.5;  // m, m/s, rad: nothing is known
-constexpr double kEarthRate = 7.3e-5;                                                // rad/s
 constexpr double kLocalPlace = 1e-4;  // m: where a local frame begins is a convention
 
 BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double yaw_std) {
@@ -97,8 +96,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   // Wheels or pictures say that it stands: what the gyro reads is bias, but for the Earth's rate.
   if (s.local && s.standing) {
     x.gyro_bias = s.mean_gyro;
-    const double noise = config_.facts.imu.gyro / std::sqrt(inertial::StandstillDetector::kBlock);
-    sigmas.segment<3>(kGyroBias).setConstant(std::hypot(noise, kEarthRate));
+    sigmas.segment<3>(kGyroBias).setConstant(s.gyro_std);
   }
   if (s.memory) recall(*s.memory, x, sigmas);
   filters_.emplace_back(config_, earth, false);

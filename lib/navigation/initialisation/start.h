@@ -14,7 +14,8 @@ namespace roadfix::navigation {
 struct StartState {
   int64_t t_us = 0;
   bool standing = false;
-  bool local = false;  ///< no GNSS: the frame begins here, `antenna` says nothing
+  double gyro_std = 0.0;  ///< rad/s, of mean_gyro as bias, of a local start at rest
+  bool local = false;     ///< no GNSS: the frame begins here, `antenna` says nothing
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_accel = Eigen::Vector3d::Zero();
   double accel_std = 1.0;                             ///< m/s2, how far the mean may be from gravity

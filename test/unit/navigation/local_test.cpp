@@ -131,7 +131,7 @@ TEST_CASE("without GNSS it starts at rest, in a local frame, and the camera hold
   CHECK(share("two eyes", run(city(), {.eyes = 2, .wheels = false})) < 0.02);
   CHECK(share("with wheels", run(city(), {})) < 0.01);
   // The camera does it: without, the same start drifts off.
-  CHECK(share("blind", run(city(), {.eyes = 0, .wheels = false})) > 2.0 * seeing);
+  CHECK(share("blind", run(city(), {.eyes = 0, .wheels = false})) > 1.5 * seeing);
 }
 
 TEST_CASE("without GNSS a start at rest takes what the gyro reads for its bias, whatever the calibration says") {
@@ -168,6 +168,20 @@ TEST_CASE("a calm road is taken for rest only where nothing contradicts") {
   CHECK_FALSE(start_at_rest(c));
   c.flow_px = 1.0;
   CHECK(start_at_rest(c));
+  // A hand that shakes is at rest where pictures say so, and the start knows it less well.
+  inertial::StandstillDetector shaken;
+  for (int i = 0; i < 50; ++i) {
+    t_us += 10'000;
+    const double sway = i < 25 ? 0.006 : -0.006;
+    (void)shaken.add({t_us, Eigen::Vector3d(sway, 0.0, 0.0), Eigen::Vector3d(10.0 * sway, 0.0, 9.81)}, 0.01,
+                     {1e-4, 1e-3}, false);
+  }
+  REQUIRE_FALSE(shaken.calm());
+  LocalContext held{config, t_us, shaken, std::nullopt, 1.0, 1.5};
+  REQUIRE(start_at_rest(held));
+  CHECK(start_at_rest(held)->gyro_std > 10.0 * start_at_rest(c)->gyro_std);
+  held.flow_px.reset();
+  CHECK_FALSE(start_at_rest(held));
   c.wheel_speed = 20.0;
   CHECK_FALSE(start_at_rest(c));
   const auto moving = start_with_speed(c);
