@@ -21,9 +21,10 @@ export function showVerdict(frame, live) {
   const facts = [['Clock, UTC', clock(frame.t), '']];
   if (pose) {
     const valid = VALIDITIES[pose.validity] !== 'invalid';
-    const heading = valid && pose.yaw_sigma < 180;
+    const placed = valid && pose.map; // in a local frame alone it has no place and no heading
+    const heading = placed && pose.yaw_sigma < 180;
     const sigma = 'one standard deviation: the error is smaller two times out of three';
-    facts.unshift(['Place sure to', valid ? `± ${metres(pose.sigma)}` : 'not known', '', sigma], ['Heading sure to', heading ? `± ${fixed(pose.yaw_sigma, 1)}` : 'not known', heading ? '°' : '', sigma],
+    facts.unshift(['Place sure to', placed ? `± ${metres(pose.sigma)}` : 'not known', '', sigma], ['Heading sure to', heading ? `± ${fixed(pose.yaw_sigma, 1)}` : 'not known', heading ? '°' : '', sigma],
       ['Speed', valid ? (Math.abs(pose.speed) * 3.6).toFixed(0) : 'not known', valid ? 'km/h' : '']);
     if (valid && pose.bound) {
       const { along, across, up, risk, usable, reason } = pose.bound;
