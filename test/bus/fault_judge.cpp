@@ -49,9 +49,11 @@ struct Pose {
   int64_t run = 0;
   int32_t reset_counter = 0;
   Odometry odometry;
+  bool in_enu = true;  ///< in a local frame it says nothing of the place
   bool is_pose = true;
 
-  [[nodiscard]] bool usable() const { return odometry.validity != Validity::kInvalid; }
+  [[nodiscard]] bool claims() const { return odometry.validity != Validity::kInvalid; }
+  [[nodiscard]] bool usable() const { return claims() && in_enu; }
 };
 
 struct Fault {
@@ -79,7 +81,7 @@ class Judge {
       told_.push_back(std::move(told));
     });
     take<pose_t>(bus, "POSE_FUSED|REFERENCE", [this](const pose_t& m, int64_t at_us, const std::string& channel) {
-      Pose pose{at_us, m.run, m.reset_counter, in_one_frame(m), true};
+      Pose pose{at_us, m.run, m.reset_counter, in_one_frame(m), m.frame == pose_t::FRAME_ENU, true};
       pose.is_pose = is_pose(pose.odometry);
       (channel == "REFERENCE" ? reference_ : fused_).push_back(pose);
     });
@@ -195,10 +197,10 @@ class Judge {
       ++poses;
       silent_s = std::max(silent_s, seconds(pose.at_us - heard_us));
       heard_us = pose.at_us;
+      if (pose.claims()) false_valid += pose.is_pose ? 0 : 1;
       if (pose.usable()) {
         unusable_s = std::max(unusable_s, seconds(pose.at_us - usable_us));
         usable_us = pose.at_us;
-        false_valid += pose.is_pose ? 0 : 1;
         jump_m = std::max(jump_m, jump(last, pose));
         measure(pose, error_m, sigmas);
       }
