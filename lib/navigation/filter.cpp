@@ -15,8 +15,8 @@ constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
 
 double square(double x) { return x * x; }
 
-// How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they differ from one turn-on to the next, a receiver that follows a reflection or is
-// dragged off.
+// How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they
+// differ from one turn-on to the next, a receiver that follows a reflection or is dragged off.
 StepDetector::Sizes typical_steps(const VehicleFacts& v) {
   constexpr double kScale = 0.02, kDisplacement = 5.0, kDrag = 0.5;  // 1, m, m/s
   StepDetector::Sizes s;

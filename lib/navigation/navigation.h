@@ -59,7 +59,7 @@ class Navigation {
 
   InputStatus see(const ImuSample& imu);       ///< newest sample, ahead of the horizon
   InputStatus advance(const ImuSample& imu);   ///< the horizon has passed this sample
-  InputStatus see(const WheelSample& wheels);  ///< newest sample, where no imu is; the first must tell a yaw rate
+  InputStatus see(const WheelSample& wheels);  ///< newest sample, where no imu is; the first must have a yaw rate
   InputStatus see(int64_t t_us);               ///< newest time, where such wheels have fallen silent
   [[nodiscard]] bool has_imu() const { return config_.facts.has_imu; }
   void add(const GnssFix& fix, int64_t id = 0);

@@ -174,7 +174,7 @@ GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
     // One receiver, one way through it, unless the calibration knows better.
     v.velocity_latency_std = gnss->velocity_latency_std.value_or(v.position_latency_std);
   }
-  // The latency's doubt is between the two clocks already, and where it is not told the IMU's defines time.
+  // The latency's uncertainty is between the two clocks already; where none is given the IMU's defines time.
   const bool latency_told = calibration.sensors.gnss && calibration.sensors.gnss->position_latency_std;
   const std::optional<double> offset_told =
       calibration.sensors.imu ? calibration.sensors.imu->time_offset_std : std::nullopt;

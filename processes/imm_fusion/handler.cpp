@@ -221,7 +221,7 @@ class ImmFusionStage final : public Stage {
   }
 
   ImmFusionConfig config_;
-  std::string calibration_;  ///< told, not used: the poses are the vehicle's already
+  std::string calibration_;  ///< received, not used: the poses are the vehicle's already
   StageSpec spec_;
   Fusion fusion_;  ///< at the horizon
   LiteralFusion literal_;

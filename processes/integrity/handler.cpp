@@ -181,7 +181,7 @@ class IntegrityStage final : public Stage {
   }
 
   IntegrityStageConfig config_;
-  std::string calibration_;  ///< told, not used: the poses are the vehicle's already
+  std::string calibration_;  ///< received, not used: the poses are the vehicle's already
   StageSpec spec_;
   std::array<Bounded, kBounded> bounded_;                   ///< POSE_INS, POSE_FUSED
   std::vector<std::pair<int, protection_level_t>> levels_;  ///< since the last publish()

@@ -118,7 +118,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   Measurement<3> velocity;
   velocity.residual = s.velocity - filter.state().x.nav.velocity;
   velocity.H.block<3, 3>(0, kVel).setIdentity();
-  // Wheels tell it in vehicle axes: free of phi, as it turns with the attitude.
+  // Wheels measure it in vehicle axes: free of phi, as it turns with the attitude.
   if (!s.local) velocity.H.block<3, 3>(0, kAtt) = -skew(filter.state().x.nav.velocity);
   velocity.R = s.velocity_std * s.velocity_std * Eigen::Matrix3d::Identity();
   (void)filter.fuse(AidingSource::kGnssVelocity, s.t_us, velocity, open);

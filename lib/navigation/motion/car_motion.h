@@ -2,7 +2,7 @@
 ///
 /// A car keeps its speed and turns its velocity with itself. From wheel samples with a yaw rate, wheel speeds alone or
 /// nothing but the stamps of fixes it makes samples that the filter takes as it takes an imu's: the yaw rate about the
-/// vehicle's z axis, the centripetal acceleration, and no gravity (Earth::kinematic). What these do not tell is process
+/// vehicle's z axis, the centripetal acceleration, and no gravity (Earth::kinematic). What these do not measure is process
 /// noise: changes of speed, of tilt and, without a yaw rate, of heading. Vehicle and imu axes are the same.
 #pragma once
 

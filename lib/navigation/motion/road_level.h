@@ -1,5 +1,5 @@
 /// A road is level but for its slope: roll and pitch of a car are small. With the process noise of the tilt it makes a
-/// stationary process of them, (N.2.9) of MODEL.md. For a car without an imu, which nothing else tells what is up.
+/// stationary process of them, (N.2.9) of MODEL.md. For a car without an imu, where nothing else measures what is up.
 #pragma once
 
 #include "navigation/measurement.h"

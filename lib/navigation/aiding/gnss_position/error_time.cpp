@@ -16,7 +16,7 @@ constexpr double kMemory = 300.0;      // likewise, of what is seen
 constexpr double kMostSquare = 9.0;    // one difference counts at most as three sigma
 // Of a difference's variance, at most, that the way's error may be. `way_std` adds up amplitudes, the most that it can be.
 constexpr double kWayShare = 4.0;
-constexpr std::array kTimes = {2.0, 3.0, 4.5, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0};  // s, that are told apart
+constexpr std::array kTimes = {2.0, 3.0, 4.5, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0};  // s, that are distinguished
 
 double lag_of(int i) { return static_cast<double>(1 << i); }
 

@@ -80,7 +80,7 @@ class GnssPositionControl {
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
   void set_bias(Filter& filter, const Bias& bias) const;
-  /// A code receiver without an imu beside it: nothing but other fixes could tell an outlier.
+  /// A code receiver without an imu beside it: nothing but other fixes could show an outlier.
   [[nodiscard]] bool heavy_tailed(FixType type) const {
     return !config_.facts.has_imu && type != FixType::kRtkFixed && type != FixType::kRtkFloat;
   }
