@@ -70,7 +70,7 @@ FuseStatus Fusion::add(const ChannelSample& s) {
   failover_.add(s.channel, fresh, channels_, local_, t_us_);
   epoch(s);
   if (s.channel == FusionChannel::kVo) watch_vision(s);
-  settle_validity(dt);
+  output_.settle(now(), dt);
   record(s.channel, status);
   return status;
 }
@@ -211,7 +211,7 @@ void Fusion::watch_vision(const ChannelSample& s) {
     const bool doubted =
         witnesses_.agreement(FusionChannel::kVo, FusionChannel::kWheel) == WitnessAgreement::kContradict;
     if (state == ChannelState::kGood && !doubted && witnesses_.last_us() == s.odometry.t_us)
-      restart_.tie(s.odometry.T_frame_vehicle, local_at(s.odometry.t_us));
+      restart_.tie(s.odometry.T_frame_vehicle, local_.odometry(channels_, s.odometry.t_us));
     return;
   }
   if (!vision_bad_since_us_) vision_bad_since_us_ = t_us_;
@@ -252,6 +252,15 @@ void Fusion::weigh() {
   for (FusionChannelReport& r : reports_) r.weight = sum > 0.0 ? r.weight / sum : 0.0;
 }
 
+ChannelSample Fusion::at_present(ChannelSample sample) const {
+  Odometry& o = sample.odometry;
+  if (!started_ || o.t_us >= t_us_) return sample;
+  const Planar motion = motion_between(local_planar(o.t_us), local_planar(t_us_));
+  o.T_frame_vehicle = o.T_frame_vehicle * SE3{quaternion({motion.z(), 0.0, 0.0}), {motion.x(), motion.y(), 0.0}};
+  o.t_us = t_us_;
+  return sample;
+}
+
 VisionRestart Fusion::take_restart(const Odometry& local) {
   return restart_.take(local, channel(FusionChannel::kVo).calibration().length());
 }
@@ -262,11 +271,11 @@ void Fusion::save(StateWriter& writer) const {
   local_.save(writer);
   failover_.save(writer);
   restart_.save(writer);
-  jumps_.save(writer);
+  output_.save(writer);
   const auto put = [&](const auto&... members) { (write(writer, members), ...); };
   for (const FusionChannelReport& r : reports_)
     put(r.status, r.nis, r.dof, r.innovation, r.innovation_variance, r.weight);
-  put(t_us_, started_, epochs_, validity_, better_for_, vision_bad_since_us_);
+  put(t_us_, started_, epochs_, vision_bad_since_us_);
 }
 
 void Fusion::load(StateReader& reader) {
@@ -275,10 +284,10 @@ void Fusion::load(StateReader& reader) {
   local_.load(reader);
   failover_.load(reader);
   restart_.load(reader);
-  jumps_.load(reader);
+  output_.load(reader);
   const auto get = [&](auto&... members) { (read(reader, members), ...); };
   for (FusionChannelReport& r : reports_) get(r.status, r.nis, r.dof, r.innovation, r.innovation_variance, r.weight);
-  get(t_us_, started_, epochs_, validity_, better_for_, vision_bad_since_us_);
+  get(t_us_, started_, epochs_, vision_bad_since_us_);
 }
 
 }  // namespace roadfix

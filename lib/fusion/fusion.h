@@ -14,29 +14,12 @@
 #include <optional>
 #include <string>
 
-#include "fusion/failover.h"
-#include "fusion/jump_count.h"
-#include "fusion/lookahead.h"
+#include "fusion/pose_output.h"
 #include "fusion/vision_restart.h"
 #include "fusion/witnesses.h"
 #include "geometry/euler.h"
 
 namespace roadfix {
-
-enum class FusionPhase { kWaiting, kRunning, kWeak, kLost };
-
-struct FusionReport {
-  FusionPhase phase = FusionPhase::kWaiting;
-  Validity validity = Validity::kInvalid;
-  Validity local_validity = Validity::kInvalid;
-  bool enu = false;
-  bool follows_ins = false;
-  std::optional<FusionChannel> leader;  ///< whose motion carries POSE_LOCAL, and POSE_FUSED where it does not follow
-  std::string reason;
-  int reset_counter = 0;
-  Planar last_jump = Planar::Zero();  ///< published new minus old
-  double last_jump_height = 0.0;      ///< m
-};
 
 /// Of the last sample of a channel: what AIDING_FUSION says.
 struct FusionChannelReport {
@@ -46,11 +29,6 @@ struct FusionChannelReport {
   Eigen::Vector3d innovation = Eigen::Vector3d::Zero();
   Eigen::Vector3d innovation_variance = Eigen::Vector3d::Zero();
   double weight = 0.0;  ///< share of the reliability, [0, 1]
-};
-
-struct FusedPoses {
-  Odometry fused, local;
-  FusionReport report;
 };
 
 class Fusion {
@@ -68,18 +46,18 @@ class Fusion {
 
   /// Both poses for now: at the newest sample of `lookahead`, or at t_us() where there is none ahead. Counts jumps of
   /// the published pose.
-  FusedPoses publish(const Lookahead& lookahead);
+  FusedPoses publish(const Lookahead& lookahead) { return output_.publish(now(), started_, lookahead); }
 
   [[nodiscard]] int64_t t_us() const { return t_us_; }
   [[nodiscard]] const Imm& imm() const { return local_.imm(); }
   [[nodiscard]] const LocalMotion& local_motion() const { return local_; }
   [[nodiscard]] const Failover& failover() const { return failover_; }
   /// POSE_LOCAL from above at a time near t_us().
-  [[nodiscard]] Planar local_planar(int64_t t_us) const;
+  [[nodiscard]] Planar local_planar(int64_t t_us) const { return local_.planar(channels_, t_us); }
   /// A sample of the past, its pose carried on to t_us() by POSE_LOCAL's motion.
   [[nodiscard]] ChannelSample at_present(ChannelSample sample) const;
   /// In plain words, what keeps POSE_FUSED from being the INS's pose with fixes; empty where nothing does.
-  [[nodiscard]] std::string reason() const;
+  [[nodiscard]] std::string reason() const { return output_.reason(now()); }
   [[nodiscard]] const PoseChannel& channel(FusionChannel c) const { return channels_[static_cast<std::size_t>(c)]; }
   [[nodiscard]] const FusionChannelReport& channel_report(FusionChannel c) const {
     return reports_[static_cast<std::size_t>(c)];
@@ -111,15 +89,7 @@ class Fusion {
   void watch_vision(const ChannelSample& sample);
   void record(FusionChannel c, FuseStatus status);
   void weigh();
-  [[nodiscard]] Validity validity_now() const;
-  void settle_validity(double dt);
-
-  /// Motion from `from` to now: by the lookahead as far as it is relied on.
-  [[nodiscard]] MotionStep motion_to_now(const CarriedPose& from, const std::optional<Lookahead::Ahead>& ahead) const;
-  [[nodiscard]] Odometry carried(const CarriedPose& pose, const std::optional<Lookahead::Ahead>& ahead) const;
-  [[nodiscard]] Odometry local_at(int64_t t_us) const;
-  [[nodiscard]] bool relies_on(const std::optional<Lookahead::Ahead>& ahead) const;
-  [[nodiscard]] FusionReport report() const;
+  [[nodiscard]] FusionNow now() const { return {config_, channels_, local_, failover_, t_us_}; }
 
   FusionConfig config_;
   Channels channels_;
@@ -127,13 +97,11 @@ class Fusion {
   LocalMotion local_;
   Failover failover_;
   VisionRestartRequest restart_;
-  JumpCount jumps_;
+  PoseOutput output_;
   std::array<FusionChannelReport, kFusionChannels> reports_;
   int64_t t_us_ = 0;
   bool started_ = false;
-  int epochs_ = 0;                          ///< since the calibration last learnt
-  Validity validity_ = Validity::kInvalid;  ///< of POSE_FUSED, with hysteresis
-  double better_for_ = 0.0;                 ///< s for which a better one has held
+  int epochs_ = 0;  ///< since the calibration last learnt
   std::optional<int64_t> vision_bad_since_us_;
 };
 

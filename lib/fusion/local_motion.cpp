@@ -115,6 +115,18 @@ MotionStep LocalMotion::motion(const Channels& channels, int64_t from_us, int64_
   return step;
 }
 
+Planar LocalMotion::planar(const Channels& channels, int64_t t_us) const {
+  if (t_us >= pose_.t_us()) return after_motion(pose_.pose(), motion(channels, pose_.t_us(), t_us).motion);
+  // Back from there: the motion from t_us to the pose, the other way round.
+  const Planar on = motion(channels, t_us, pose_.t_us()).motion;
+  return after_motion(pose_.pose(), motion_between(on, Planar::Zero()));
+}
+
+Odometry LocalMotion::odometry(const Channels& channels, int64_t t_us) const {
+  return full_pose(t_us, planar(channels, t_us), pose_.covariance(channels), pose_.height(), pose_.height_variance(),
+                   attitude(channels, t_us));
+}
+
 Odometry LocalMotion::attitude(const Channels& channels, int64_t t_us) const {
   Odometry o = attitude_;
   if (!velocity_) return o;

@@ -28,6 +28,9 @@ class LocalMotion {
 
   /// Motion between two times by the best velocity there is, changed as the IMM's acceleration has it.
   [[nodiscard]] MotionStep motion(const Channels& channels, int64_t from_us, int64_t to_us) const;
+  /// POSE_LOCAL at a time near pose().t_us(), before it as well: from above, and whole.
+  [[nodiscard]] Planar planar(const Channels& channels, int64_t t_us) const;
+  [[nodiscard]] Odometry odometry(const Channels& channels, int64_t t_us) const;
   /// Roll, pitch, velocity and rates of the channels that are relied on, for t_us; the pose itself is not filled in.
   [[nodiscard]] Odometry attitude(const Channels& channels, int64_t t_us) const;
 

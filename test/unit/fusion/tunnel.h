@@ -36,6 +36,8 @@ struct Tunnel {
   }
 };
 
+inline double time_of(const Tunnel& t, const StreamEvent& e) { return seconds(t.drive, e.sample.odometry.t_us); }
+
 /// Largest horizontal error of the fused pose between two times.
 struct Watch {
   const SimulatedDrive& drive;
