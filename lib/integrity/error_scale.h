@@ -1,5 +1,5 @@
 /// How large errors are against what was claimed for them, and how heavy their tails: the posterior predictive of an
-/// error whose scale is known from a few normalised squares only is Student's t, lib/integrity/MODEL.md (I.2.n).
+/// error whose scale is known from a few normalised squares only is Student's t, lib/integrity/MODEL.md (P.2.n).
 /// Squares are given in order of time. The same squares give the same bits. Not thread safe.
 #pragma once
 
@@ -19,11 +19,11 @@ class ErrorScale {
   /// `squares`: sum of `dof` squared normalised errors at one time.
   void add(int64_t t_us, double squares, double dof);
 
-  /// Degrees of freedom of the predictive distribution at a time, (I.2.2): fewer the longer nothing was seen.
+  /// Degrees of freedom of the predictive distribution at a time, (P.2.2): fewer the longer nothing was seen.
   [[nodiscard]] double dof(int64_t t_us) const;
-  /// Its scale, claimed sigmas, (I.2.3).
+  /// Its scale, claimed sigmas, (P.2.3).
   [[nodiscard]] double scale(int64_t t_us) const;
-  /// Exceeded by the error's magnitude with probability `risk`, claimed sigmas, (I.2.4). The scale counts as `least`
+  /// Exceeded by the error's magnitude with probability `risk`, claimed sigmas, (P.2.4). The scale counts as `least`
   /// at least: squares below what was claimed do not make a bound smaller than the claim.
   [[nodiscard]] double quantile(int64_t t_us, double risk, double least = 1.0) const;
 

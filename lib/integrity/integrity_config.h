@@ -5,14 +5,14 @@
 
 namespace roadfix {
 
-/// The posterior of an error's scale, (I.2.n).
+/// The posterior of an error's scale, (P.2.n).
 struct ErrorScaleConfig {
   double prior_dof = 6.0;    ///< independent squares that the claimed sigma counts for
   double memory = 30.0;      ///< s
   double correlation = 3.0;  ///< s, squares closer in time are not independent
 };
 
-/// Dead reckoning (POSE_WHEEL) beside the estimate, (I.4.n). Vectors: along, across, up.
+/// Dead reckoning (POSE_WHEEL) beside the estimate, (P.4.n). Vectors: along, across, up.
 struct WitnessConfig {
   Eigen::Vector3d ratio_std{0.01, 0.01, 0.02};      ///< of the way: scale and axes of the witness, before it is learnt
   double sideslip_std = 0.005;                      ///< rad per m/s2 of lateral acceleration, before it is learnt

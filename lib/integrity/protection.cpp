@@ -65,7 +65,7 @@ bool ProtectionMonitor::coasting_since(int64_t t_us) const {
 
 bool ProtectionMonitor::coasting() const { return !fix_us_ || coasting_since(*fix_us_); }
 
-/// (I.3.2): the sum of n independent innovations has the sigma sqrt(n).
+/// (P.3.2): the sum of n independent innovations has the sigma sqrt(n).
 bool ProtectionMonitor::biased() const {
   if (innovation_weight_ < kLeastInnovations || !innovation_us_) return false;
   const double bound =
@@ -73,18 +73,18 @@ bool ProtectionMonitor::biased() const {
   return (mean_innovation_.cwiseAbs().array() > bound).any();
 }
 
-// (I.5.1): positions are absent, so that the estimate itself is dead reckoning.
+// (P.5.1): positions are absent, so that the estimate itself is dead reckoning.
 void ProtectionMonitor::hold_while_coasting() {
   const Anchor& now = separation_.now();
   failed_us_ = now.t_us;
-  if (refused_us_ && !coasting_since(*refused_us_)) return doubt();
+  if (refused_us_ && !coasting_since(*refused_us_)) return contradict();
   if (anchored_ && !returned_) return;
   anchor_ = now;  // what comes back is held against this
   anchored_ = returned_ = true;
 }
 
-// (I.5.2): the fault may be as old as the look-back.
-void ProtectionMonitor::doubt() {
+// (P.5.2): the fault may be as old as the look-back.
+void ProtectionMonitor::contradict() {
   const Anchor& now = separation_.now();
   failed_us_ = now.t_us;
   if (!anchored_) anchor_ = separation_.before(config_.look_back).value_or(now);
@@ -94,7 +94,7 @@ void ProtectionMonitor::doubt() {
   if (seconds_between(anchor_.t_us, now.t_us) > config_.verify && agrees_with_anchor()) separation_.learn();
 }
 
-void ProtectionMonitor::doubt_since(int64_t t_us) {
+void ProtectionMonitor::inherit_contradiction(int64_t t_us) {
   if (!first_us_) return;
   const Anchor& now = separation_.now();
   failed_us_ = now.t_us;
@@ -109,8 +109,8 @@ void ProtectionMonitor::update_checks() {
   if (!first_us_) first_us_ = now.t_us;
   if (coasting()) return hold_while_coasting();
   fix_way_ = now.way;
-  if (separation_.contradicted() || biased()) return doubt();
-  // (I.5.3)
+  if (separation_.contradicted() || biased()) return contradict();
+  // (P.5.3)
   const double wait = returned_ ? config_.verify : config_.recover;
   if (anchored_ && seconds_between(*failed_us_, now.t_us) > wait && agrees_with_anchor()) anchored_ = returned_ = false;
   if (anchored_) return;
@@ -134,7 +134,7 @@ void ProtectionMonitor::raise(int risk, const Eigen::Vector3d& level, Hypothesis
   reached = reached.cwiseMax(level);
 }
 
-// (I.3.1), (I.3.3)
+// (P.3.1)
 void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out) const {
   const bool begins = seconds_between(*first_us_, estimate.t_us) < config_.verify;
   const double share = anchored_ || begins ? 1.0 : config_.correlated_share;
@@ -150,7 +150,7 @@ void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out
   }
 }
 
-// (I.4.7)
+// (P.4.7)
 void ProtectionMonitor::apply_receiver(Protection& out) const {
   const std::optional<Anchor> anchor = separation_.before(config_.witness.short_lag);
   if (!anchor) return;
@@ -167,7 +167,7 @@ void ProtectionMonitor::apply_receiver(Protection& out) const {
   }
 }
 
-// (I.5.5)
+// (P.5.5)
 void ProtectionMonitor::apply_anchor(Protection& out) const {
   if (!anchored_) return;
   const Hypothesis hypothesis = returned_ ? Hypothesis::kUnverified : Hypothesis::kContradiction;
@@ -184,7 +184,7 @@ void ProtectionMonitor::apply_anchor(Protection& out) const {
   }
 }
 
-// (I.6.1)
+// (P.6.1)
 void ProtectionMonitor::apply_coasting(Protection& out) const {
   const Anchor& now = separation_.now();
   if (!coasting()) return;

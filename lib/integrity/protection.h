@@ -1,5 +1,5 @@
 /// Protection levels of one stream of poses: along, across and up, beyond which an error lies with a stated
-/// probability, and whether the pose may be used for what the alert limits stand for. lib/integrity/MODEL.md, (I.n.m).
+/// probability, and whether the pose may be used for what the alert limits stand for. lib/integrity/MODEL.md, (P.n.m).
 ///
 /// Inputs in order of time; what the receiver's innovations and the witness say up to a pose's time comes before it.
 /// The same inputs in the same order give the same bits. Not thread safe.
@@ -56,12 +56,12 @@ class ProtectionMonitor {
   void add(const PositionInnovation& innovation);
   /// Dead reckoning that takes no positions; `jumps` differs where it began anew.
   void add_witness(const Odometry& pose, int64_t jumps) { separation_.add_witness(pose, jumps); }
-  /// Begin of the time that a contradiction leaves in doubt; nothing where there is none.
-  [[nodiscard]] std::optional<int64_t> doubted_since() const {
+  /// Time of the anchor that a contradiction holds on to; nothing where there is none.
+  [[nodiscard]] std::optional<int64_t> contradicted_since() const {
     return anchored_ && !returned_ ? std::optional<int64_t>(anchor_.t_us) : std::nullopt;
   }
-  /// What feeds this estimate is in doubt since then: so is this one, (I.5.6).
-  void doubt_since(int64_t t_us);
+  /// What feeds this estimate is contradicted, anchored at that time: so is this one, (P.5.4).
+  void inherit_contradiction(int64_t t_us);
   /// The bound of a pose in ENU axes; an invalid one has none.
   Protection bound(const Odometry& estimate);
 
@@ -79,7 +79,7 @@ class ProtectionMonitor {
  private:
   void update_checks();
   void hold_while_coasting();
-  void doubt();
+  void contradict();
   [[nodiscard]] bool coasting() const;
   [[nodiscard]] bool coasting_since(int64_t t_us) const;
   [[nodiscard]] bool biased() const;
@@ -102,8 +102,8 @@ class ProtectionMonitor {
   double turning_ = 0.0;  ///< m/s2, the last seconds' largest lateral acceleration, decaying
   double fix_way_ = 0.0;  ///< m, driven until the last position
   bool anchored_ = false;
-  Anchor anchor_;          ///< what is left of the time before positions came into doubt
-  bool returned_ = false;  ///< the doubt is an outage's, not a contradiction's
+  Anchor anchor_;          ///< the pose from before positions became suspect, (P.5.n)
+  bool returned_ = false;  ///< the anchor is an outage's, not a contradiction's
 };
 
 }  // namespace roadfix

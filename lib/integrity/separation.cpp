@@ -91,7 +91,7 @@ Eigen::Vector3d SeparationMonitor::ways_since(const Anchor& anchor) const {
   return {way, now_.bend - anchor.bend, 0.5 * way * seconds_between(anchor.t_us, now_.t_us)};
 }
 
-// (I.4.1) to (I.4.3)
+// (P.4.1) to (P.4.3)
 Separation SeparationMonitor::since(const Anchor& anchor) const {
   Separation s;
   const double tau = seconds_between(anchor.t_us, now_.t_us);
@@ -139,7 +139,7 @@ bool SeparationMonitor::contradicted() const {
   return false;
 }
 
-// (I.4.4), (I.4.5): a Kalman filter per axis for the ratio, and the scale of what it leaves.
+// (P.4.4), (P.4.5): a Kalman filter per axis for the ratio, and the scale of what it leaves.
 void SeparationMonitor::learn() {
   for (std::size_t lag = 0; lag < scale_.size(); ++lag) {
     const std::optional<Lagged> l = lagged(lag);

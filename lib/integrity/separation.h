@@ -1,5 +1,5 @@
 /// Solution separation: the way of an estimate since an earlier pose of its own (the anchor) against the way by dead
-/// reckoning, lib/integrity/MODEL.md (I.4.n). What is constant between the two (wheel scale, mounting) is learnt while
+/// reckoning, lib/integrity/MODEL.md (P.4.n). What is constant between the two (wheel scale, mounting) is learnt while
 /// nothing contradicts. The witness's frame is its own; only its ways and turns count.
 #pragma once
 
@@ -51,9 +51,9 @@ class SeparationMonitor {
   /// Takes the estimate's newest pose; the separations below are at it.
   void step(const Odometry& estimate);
 
-  /// Whether a separation over the short or the long lag is larger than learnt, (I.4.6).
+  /// Whether a separation over the short or the long lag is larger than learnt, (P.4.6).
   [[nodiscard]] bool contradicted() const;
-  /// Learns from the newest separations, (I.4.4), (I.4.5): for the caller to call while nothing contradicts.
+  /// Learns from the newest separations, (P.4.4), (P.4.5): for the caller to call while nothing contradicts.
   void learn();
 
   [[nodiscard]] const Anchor& now() const { return now_; }

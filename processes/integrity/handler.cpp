@@ -168,8 +168,8 @@ class IntegrityStage final : public Stage {
   void bound(std::size_t channel, const pose_t& pose) {
     Bounded& b = bounded_[channel];
     // The fusion follows the INS.
-    const std::optional<int64_t> doubted = bounded_[0].monitor.doubted_since();
-    if (channel == 1 && doubted) b.monitor.doubt_since(*doubted);
+    const std::optional<int64_t> since = bounded_[0].monitor.contradicted_since();
+    if (channel == 1 && since) b.monitor.inherit_contradiction(*since);
     Odometry estimate = odometry(pose);
     if (pose.frame != pose_t::FRAME_ENU) estimate.validity = Validity::kInvalid;
     if (estimate.validity != Validity::kInvalid) {

@@ -151,10 +151,10 @@ TEST_CASE("protection: what has no position yet, or no valid pose, has no bound 
   CHECK(monitor.bound(invalid).reason == "the pose is not valid");
 }
 
-TEST_CASE("protection: what is fed by an estimate in doubt is held against its own pose of that time") {
+TEST_CASE("protection: what is fed by a contradicted estimate is held against its own pose of that time") {
   CarOptions options = dragged();
   const auto tell = [](double t, ProtectionMonitor& monitor) {
-    if (std::abs(t - 60.0) < 0.01) monitor.doubt_since(50'000'000);
+    if (std::abs(t - 60.0) < 0.01) monitor.inherit_contradiction(50'000'000);
   };
   const std::vector<CarSample> alone = drive(options, {}), told = drive(options, {}, tell);
   CHECK(alone[650].protection.hypothesis != Hypothesis::kContradiction);
