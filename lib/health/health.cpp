@@ -69,6 +69,10 @@ void Health::pose(const std::string& name, int64_t now_us, PoseFacts facts) {
   monitor.add(now_us, facts);
 }
 
+void Health::bound(const std::string& name, const BoundFacts& facts) {
+  if (const auto known = poses_.find(name); known != poses_.end()) known->second.add_bound(facts);
+}
+
 void Health::measurement(const std::string& source, int64_t now_us, double nis, int dof, bool accepted) {
   sources_.try_emplace(source, source, config_.consistency).first->second.add(now_us, nis, dof, accepted);
 }

@@ -50,6 +50,8 @@ class Health {
   void unusable(const std::string& channel, int64_t now_us);
   void heartbeat(const std::string& process, int64_t now_us, const HeartbeatFacts& facts);
   void pose(const std::string& channel, int64_t now_us, PoseFacts facts);
+  /// Of an estimate that is known already.
+  void bound(const std::string& channel, const BoundFacts& facts);
   /// `source`: "POSE_VO in FUSION"; of a pose that begins anew what came before is forgotten.
   void measurement(const std::string& source, int64_t now_us, double nis, int dof, bool accepted);
   void host(int64_t now_us, const HostFacts& facts);

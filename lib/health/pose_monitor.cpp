@@ -16,6 +16,7 @@ constexpr int64_t kHistory_us = 12'000'000;
 constexpr int64_t kSpacing_us = 50'000;
 /// Two outputs further apart than this are not compared: the velocity between them is not known.
 constexpr int64_t kMaxStep_us = 500'000;
+constexpr int64_t kBoundHolds_us = 1'000'000;
 
 bool finite(const Odometry& o) {
   return o.T_frame_vehicle.p.allFinite() && o.T_frame_vehicle.q.coeffs().allFinite() && o.velocity.allFinite() &&
@@ -153,6 +154,7 @@ PoseReport PoseMonitor::report() const {
   report.position_std = horizontal_ellipse(o.cov_pose.topLeftCorner<2, 2>()).major;
   report.yaw_std = yaw_std(o);
   report.speed = o.velocity.x();
+  if (bound_ && usable() && std::abs(o.t_us - bound_->pose_us) < kBoundHolds_us) report.bound = bound_;
   return report;
 }
 

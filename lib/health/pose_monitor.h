@@ -23,6 +23,15 @@ struct PoseFacts {
   int32_t reset_counter = 0;
 };
 
+/// Protection levels that were published for an estimate, at the rarest of their risks.
+struct BoundFacts {
+  int64_t pose_us = 0;                              ///< of the pose that is bounded
+  double risk = 0.0;                                ///< per pose: an error above its level, any axis
+  Eigen::Vector3d level = Eigen::Vector3d::Zero();  ///< m, along, across, up; infinite where there is none
+  bool usable = false;                              ///< the levels are within the alert limits
+  std::string reason;                               ///< why not, plain words
+};
+
 /// 68 % of the horizontal error lies within one of these along its axis.
 struct HorizontalEllipse {
   double major = 0.0;      ///< m, one sigma
@@ -36,9 +45,10 @@ struct PoseReport {
   std::string name;
   Validity validity = Validity::kInvalid;
   std::string reason;
-  double position_std = 0.0;  ///< m, horizontal, along the worst direction
-  double yaw_std = 0.0;       ///< rad
-  double speed = 0.0;         ///< m/s, forward
+  double position_std = 0.0;        ///< m, horizontal, along the worst direction
+  double yaw_std = 0.0;             ///< rad
+  double speed = 0.0;               ///< m/s, forward
+  std::optional<BoundFacts> bound;  ///< of a pose a moment ago
 };
 
 class PoseMonitor {
@@ -47,6 +57,7 @@ class PoseMonitor {
 
   /// `facts` in the frame that all absolute poses share (health/health.h sees to that).
   void add(int64_t now_us, const PoseFacts& facts);
+  void add_bound(const BoundFacts& bound) { bound_ = bound; }
   /// Whether `facts` is of another run or behind a reset: what was before is no reference for it.
   [[nodiscard]] bool is_restart(const PoseFacts& facts) const {
     return newest_ && (newest_->run != facts.run || newest_->reset_counter != facts.reset_counter);
@@ -80,6 +91,7 @@ class PoseMonitor {
   std::string name_;
   PoseLimits limits_;
   std::optional<PoseFacts> newest_;
+  std::optional<BoundFacts> bound_;
   int64_t now_us_ = 0;
   bool was_usable_ = false;
   std::deque<Point> track_;

@@ -86,6 +86,9 @@ void MonitorHandler::take(const BusMessage& message, int64_t now_us) {
 void MonitorHandler::translate(const std::string& channel, const std::string& type, std::span<const uint8_t> bytes) {
   if (type == "pose_t" && channel != "REFERENCE") {
     health_.pose(channel, now_us_, pose_facts(decode<pose_t>(bytes)));
+  } else if (type == "protection_level_t") {
+    if (const auto bound = bound_facts(decode<protection_level_t>(bytes)))
+      health_.bound(pose_of_protection(channel), *bound);
   } else if (type == "heartbeat_t") {
     health_.heartbeat(process_of_channel(channel), now_us_, heartbeat_facts(decode<heartbeat_t>(bytes)));
   } else if (type == "aiding_t") {

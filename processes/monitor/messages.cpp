@@ -89,6 +89,12 @@ HeartbeatFacts heartbeat_facts(const heartbeat_t& m) {
   return facts;
 }
 
+std::optional<BoundFacts> bound_facts(const protection_level_t& m) {
+  if (m.num_risks <= 0) return std::nullopt;
+  return BoundFacts{
+      m.pose_utime, m.risk.back(), {m.along_m.back(), m.across_m.back(), m.up_m.back()}, m.usable != 0, m.reason};
+}
+
 std::string source_name(const std::string& channel, int8_t source) {
   const auto i = static_cast<uint8_t>(source);  // a negative one lies beyond the last
   const std::string name = i < kSources.size() ? kSources[i] : "Unknown source";
@@ -127,6 +133,10 @@ std::string type_of_channel(const std::string& channel) {
     if (!name.empty() && (name.ends_with('_') ? channel.starts_with(name) : channel == name)) return type;
   }
   return "";
+}
+
+std::string pose_of_protection(const std::string& channel) {
+  return "POSE_" + channel.substr(std::string("PROTECTION_").size());
 }
 
 std::string process_of_channel(const std::string& channel) {

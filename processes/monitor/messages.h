@@ -1,10 +1,12 @@
 /// Messages to what lib/health takes, and its report to HEALTH.
 #pragma once
 
+#include <optional>
 #include <roadfix/aiding_t.hpp>
 #include <roadfix/health_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
 #include <roadfix/pose_t.hpp>
+#include <roadfix/protection_level_t.hpp>
 #include <string>
 
 #include "health/health.h"
@@ -13,6 +15,8 @@ namespace roadfix {
 
 PoseFacts pose_facts(const pose_t& message);
 HeartbeatFacts heartbeat_facts(const heartbeat_t& message);
+/// Nothing where it has no level.
+std::optional<BoundFacts> bound_facts(const protection_level_t& message);
 
 /// "GNSS position in INS": the source and whose estimate it went into.
 std::string source_name(const std::string& channel, int8_t source);
@@ -22,6 +26,9 @@ health_t health_message(const HealthReport& report);
 
 /// The type that a channel of ours carries; empty for a channel that is not ours.
 std::string type_of_channel(const std::string& channel);
+
+/// POSE_FUSED of PROTECTION_FUSED.
+std::string pose_of_protection(const std::string& channel);
 
 /// gnss_ins_ekf of HEARTBEAT_GNSS_INS_EKF.
 std::string process_of_channel(const std::string& channel);

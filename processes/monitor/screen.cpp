@@ -108,6 +108,21 @@ void put_verdict(Page& page, const HealthReport& report, int columns) {
   for (std::size_t i = 0; i < 5; ++i) page.line(" " + letters(words, i), colour);
 }
 
+/// What stage integrity bounds the error by.
+void put_bound(Page& page, const PoseReport& pose) {
+  if (!pose.bound) return;
+  const BoundFacts& b = *pose.bound;
+  const std::string risk = fmt::format("risk {:g} per pose", b.risk);
+  if (!b.level.allFinite()) {
+    page.line(fmt::format(" no bound at {}: {}", risk, b.reason), kColours[2]);
+    return;
+  }
+  page.line(fmt::format(" within {:.2f} m along, {:.2f} m across, {:.2f} m up ({}): {}", b.level.x(), b.level.y(),
+                        b.level.z(), risk, b.usable ? "usable" : "not usable"),
+            b.usable ? nullptr : kColours[1]);
+  if (!b.usable && !b.reason.empty()) page.line("   " + b.reason, kColours[1]);
+}
+
 void put_estimate(Page& page, const HealthReport& report, int columns) {
   const std::string since = duration(static_cast<double>(report.now_us - report.since_us) * 1e-6);
   for (const PoseReport& pose : report.poses) {
@@ -123,6 +138,7 @@ void put_estimate(Page& page, const HealthReport& report, int columns) {
     const bool fits = static_cast<int>(place.size() + rest.size()) < columns;
     page.line(fits ? fmt::format("{},{}", place, rest) : place);
     if (!fits) page.line(rest);
+    put_bound(page, pose);
     return;
   }
   page.line(fmt::format(" no estimate; this verdict for {}", since));

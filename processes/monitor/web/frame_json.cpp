@@ -25,15 +25,13 @@ Json mark_json(const FrameMark& mark) {
           {"pinned", mark.pinned}};
 }
 
-/// The levels of the rarest risk.
-Json protection_json(const protection_level_t& m) {
-  Json json = {{"usable", m.usable != 0}, {"reason", m.reason}};
-  if (m.num_risks == 0) return json;
-  json["risk"] = m.risk.back();
-  json["along"] = number(m.along_m.back(), 2);
-  json["across"] = number(m.across_m.back(), 2);
-  json["up"] = number(m.up_m.back(), 2);
-  return json;
+Json bound_json(const BoundFacts& bound) {
+  return {{"usable", bound.usable},
+          {"reason", bound.reason},
+          {"risk", bound.risk},
+          {"along", number(bound.level.x(), 2)},
+          {"across", number(bound.level.y(), 2)},
+          {"up", number(bound.level.z(), 2)}};
 }
 
 Json pose_json(const FramePose& pose) {
@@ -45,7 +43,7 @@ Json pose_json(const FramePose& pose) {
                {"speed", number(pose.report.speed, 2)},
                {"age", number(pose.age_s, 2)}};
   if (pose.on_map) json["map"] = mark_json(*pose.on_map);
-  if (pose.protection != nullptr) json["bound"] = protection_json(*pose.protection);
+  if (pose.report.bound) json["bound"] = bound_json(*pose.report.bound);
   if (pose.error) {
     json["err"] = number(pose.error->x(), 3);
     json["yaw_err"] = number(pose.error->y() / kDegree, 2);

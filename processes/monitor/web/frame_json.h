@@ -6,7 +6,6 @@
 #include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/ins_status_t.hpp>
-#include <roadfix/protection_level_t.hpp>
 #include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <string>
@@ -27,8 +26,7 @@ struct FramePose {
   PoseReport report;
   double age_s = 0.0;
   std::optional<FrameMark> on_map;
-  std::optional<Eigen::Vector2d> error;            ///< m horizontal, rad, against the reference
-  const protection_level_t* protection = nullptr;  ///< of this estimate, where it is new enough
+  std::optional<Eigen::Vector2d> error;  ///< m horizontal, rad, against the reference
 };
 
 struct FrameParts {

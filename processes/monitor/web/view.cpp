@@ -13,8 +13,7 @@ namespace roadfix {
 namespace {
 
 constexpr double kPinYawStd = 5.0 * kDegree;  ///< of the judged estimate, for another frame to be laid on it
-constexpr int64_t kBoundHolds_us = 1'000'000;
-constexpr double kPinStd = 3.0;  ///< m
+constexpr double kPinStd = 3.0;               ///< m
 
 SE3 yaw_only(const SE3& T) {
   SE3 level = T;
@@ -47,8 +46,6 @@ void DriveView::message(const std::string& channel, const std::string& type, con
     features_ = decode<vo_features2_t>(message.bytes);
   } else if (type == "ins_status_t") {
     ins_status_ = decode<ins_status_t>(message.bytes);
-  } else if (type == "protection_level_t") {
-    protection_["POSE_" + channel.substr(channel.find('_') + 1)] = decode<protection_level_t>(message.bytes);
   } else if (type == "gnss_t") {
     gnss_ = decode<gnss_t>(message.bytes);
   } else if (type == "image_t") {
@@ -140,10 +137,6 @@ std::string DriveView::frame(const HealthReport& report) {
     pose.report = monitor.report();
     pose.age_s = seconds_between(monitor.newest_now_us(), report.now_us);
     pose.error = error(monitor);
-    const auto bound = protection_.find(name);
-    if (bound != protection_.end() && monitor.usable() &&
-        std::abs(monitor.newest()->odometry.t_us - bound->second.pose_utime) < kBoundHolds_us)
-      pose.protection = &bound->second;
     if (const auto place = placed(monitor)) {
       pose.on_map = FrameMark{place->T_enu_vehicle.p.head<2>(), yaw_of(place->T_enu_vehicle.q),
                               horizontal_ellipse(place->cov), place->pinned};

@@ -6,7 +6,6 @@
 #include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/gnss_t.hpp>
 #include <roadfix/ins_status_t.hpp>
-#include <roadfix/protection_level_t.hpp>
 #include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_status_t.hpp>
 #include <string>
@@ -63,7 +62,6 @@ class DriveView : public MonitorListener {
   std::optional<vo_features2_t> features_;
   std::optional<ins_status_t> ins_status_;
   std::optional<gnss_t> gnss_;
-  std::map<std::string, protection_level_t> protection_;  ///< the newest, by the channel of the poses that it bounds
   int64_t picture_utime_ = 0;
 };
 

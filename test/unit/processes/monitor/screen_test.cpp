@@ -1,6 +1,7 @@
 #include "monitor/screen.h"
 
 #include <catch2/catch.hpp>
+#include <limits>
 
 using namespace roadfix;
 
@@ -68,6 +69,24 @@ TEST_CASE("verdict in big letters where there is room, in words where there is n
   CHECK_THAT(narrow, Catch::Contains("DO NOT USE"));
   CHECK_THAT(narrow, !Catch::Contains("█"));
   CHECK_THAT(narrow, Catch::Contains("km/h; this verdict for"));  // in a line of its own
+}
+
+TEST_CASE("the screen shows the protection levels of the judged pose, and why it is not usable") {
+  HealthReport report = some_report(Verdict::kOk);
+  CHECK_THAT(render_screen(report, {100, 40}, false), !Catch::Contains("along"));
+  BoundFacts bound{report.now_us, 1e-5, {0.9, 0.31, 1.2}, true, ""};
+  report.poses[0].bound = bound;
+  CHECK_THAT(render_screen(report, {100, 40}, false),
+             Catch::Contains("within 0.90 m along, 0.31 m across, 1.20 m up (risk 1e-05 per pose): usable"));
+  bound.usable = false;
+  bound.reason = "positions are not checked yet";
+  report.poses[0].bound = bound;
+  const std::string refused = render_screen(report, {100, 40}, false);
+  CHECK_THAT(refused, Catch::Contains("not usable"));
+  CHECK_THAT(refused, Catch::Contains("positions are not checked yet"));
+  bound.level.y() = std::numeric_limits<double>::infinity();
+  report.poses[0].bound = bound;
+  CHECK_THAT(render_screen(report, {100, 40}, false), Catch::Contains("no bound at risk 1e-05 per pose"));
 }
 
 TEST_CASE("a pose that is none has no numbers") {
