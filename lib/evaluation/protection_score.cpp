@@ -24,6 +24,7 @@ std::vector<Scored> scored_samples(const std::vector<ProtectionSample>& levels, 
   std::vector<Scored> scored;
   std::size_t next = 0;
   for (const ProtectionSample& sample : levels) {
+    if (sample.risk != levels.front().risk || sample.level.size() != sample.risk.size()) continue;
     const auto away = [&](std::size_t i) { return std::abs(errors[i].t_us - sample.pose_us); };
     while (next + 1 < errors.size() && away(next + 1) <= away(next)) ++next;
     if (errors.empty() || away(next) > kNear_us) continue;
@@ -131,6 +132,7 @@ std::optional<ProtectionScore> protection_score(const std::vector<ProtectionSamp
   for (std::size_t r = 0; r < scored.front().sample->risk.size(); ++r) score_risk(scored, r, reference_sigma, out);
   out.independent = independent_samples(scored);
   score_stretches(scored, reference_sigma, out);
+  for (const Scored& s : scored) out.series.push_back({*s.sample, s.error});
   for (Eigen::Index axis = 0; axis < static_cast<Eigen::Index>(kProtectedAxes); ++axis) {
     std::vector<double> magnitudes;
     for (const Scored& s : scored) magnitudes.push_back(s.error(axis));

@@ -24,6 +24,12 @@ struct ProtectionSample {
   bool usable = false;
 };
 
+/// Levels and the error that they are held against.
+struct BoundedError {
+  ProtectionSample levels;
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();  ///< m, along, across, up, magnitudes
+};
+
 struct RiskScore {
   double risk = 0.0;
   int64_t misleading = 0;                              ///< samples with an error above its level, in any axis
@@ -44,10 +50,12 @@ struct ProtectionScore {
   int64_t interruptions = 0;      ///< ends of stretches of usable samples: continuity
   double longest_misled_s = 0.0;  ///< longest stretch that is usable with an error above a level of the first risk
   Eigen::Vector3d error_p95 = Eigen::Vector3d::Zero();  ///< m, 95 % of the errors' magnitudes
+  std::vector<BoundedError> series;                     ///< all samples, bounded or not, in order of time
 };
 
 /// Levels held against the error nearest in time, within 60 ms. The reference's own sigma widens the level as far as an
-/// error of it can explain: level^2 + (k sigma)^2 with k the Gaussian's at the level's risk. Nothing where none meet.
+/// error of it can explain: level^2 + (k sigma)^2 with k the Gaussian's at the level's risk. Levels of other risks than
+/// the first ones are left out. Nothing where none meet.
 std::optional<ProtectionScore> protection_score(const std::vector<ProtectionSample>& levels,
                                                 const std::vector<PoseError>& errors, double reference_sigma);
 

@@ -123,6 +123,53 @@ function drawAxes() {
   }
 }
 
+const bounded = channels.filter((c) => c.levels);
+const axisNames = ["along", "across", "up"];
+const riskColor = (i) => palette[(i + 3) % palette.length];
+const chosenLevels = () => bounded[+byId("levels-channel").value] || bounded[0];
+
+function drawLevels() {
+  const host = byId("levels"), c = chosenLevels();
+  host.textContent = "";
+  const cells = c.levels.axes.map((axis, a) => {
+    const cell = node("div", {}, host);
+    node("h4", {}, cell, `${axisNames[a]}, m`);
+    return [node("div", { class: "plot" }, cell), axis, a];
+  });
+  for (const [plot, axis, a] of cells) {
+    const t = c.levels.t, limit = c.levels.alert_limit_m[a];
+    const series = axis.level_m.map((y, r) => ({ name: `level at ${c.levels.risks[r]}`, color: riskColor(r), t, y }));
+    series.push({ name: "error", color: c.color, t, y: axis.error_m });
+    const errors = inTime(t, axis.error_m), levels = axis.level_m.flatMap((y) => inTime(t, y));
+    const high = largest(errors.concat(levels, limit < 1e3 ? [limit] : []), 1e-2) * 1.5;
+    const low = Math.max(high * 1e-5, 1e-3, Math.min(high / 10, quantile(errors, 0.05)));
+    timePlot(plot, { label: `Error and levels ${axisNames[a]}`, height: 190, log: true, unit: "m", low, high, series, line: limit < high ? limit : undefined });
+  }
+}
+
+function drawStanford() {
+  const host = byId("stanford"), figures = chosenLevels().figures.protection, risk = figures.risks[+byId("levels-risk").value] || figures.risks[0];
+  host.textContent = "";
+  byId("levels-facts").textContent = `${risk.misleading} of ${figures.samples} samples misleading, ${risk.hazardous} hazardous, ${figures.unbounded} without a bound; about ${Math.round(figures.independent)} independent.`;
+  const plotsOf = risk.stanford.map((cells, a) => {
+    const cell = node("div", {}, host);
+    node("h4", {}, cell, `${axisNames[a]}: ${risk.misleading_by_axis[a]} misleading`);
+    return [node("div", { class: "plot" }, cell), cells];
+  });
+  for (const [plot, cells] of plotsOf) stanford(plot, cells, plots.bins, 300);
+}
+
+function levelsControls() {
+  if (!bounded.length) { byId("levels-section").remove(); return; }
+  bounded.forEach((c, i) => node("option", { value: i }, byId("levels-channel"), c.channel));
+  bounded[0].levels.risks.forEach((risk, i) => {
+    node("option", { value: i }, byId("levels-risk"), String(risk));
+    legendEntry(byId("levels-legend"), `level at ${risk}`, riskColor(i));
+  });
+  byId("levels-channel").addEventListener("change", () => { drawLevels(); drawStanford(); });
+  byId("levels-risk").addEventListener("change", drawStanford);
+}
+
 function drawNees() {
   const series = channels.map((c) => ({ name: c.channel + " position", color: c.color, t: c.series.t, y: c.series.nees_position }));
   const values = series.flatMap((s) => inTime(s.t, s.y)).filter((v) => v > 0);
@@ -235,7 +282,10 @@ function outageTable() {
   }
 }
 
-function draw() { drawMap(); drawHorizontal(); drawPresence(); drawAxes(); drawNees(); drawFusion(); }
+function draw() {
+  drawMap(); drawHorizontal(); drawPresence(); drawAxes(); drawNees(); drawFusion();
+  if (bounded.length) { drawLevels(); drawStanford(); }
+}
 
 function start() {
   const first = channels[0] ? channels[0].figures : null;
@@ -250,6 +300,7 @@ function start() {
   byId("map-mode").value = "all";
   outageTable();
   fusionLegend();
+  levelsControls();
   byId("map-mode").addEventListener("change", drawMap);
   byId("axis-channel").addEventListener("change", drawAxes);
   byId("log-scale").addEventListener("change", drawHorizontal);

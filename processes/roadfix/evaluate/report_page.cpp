@@ -73,6 +73,41 @@ Json series_json(const ChannelScore& c, const Clock& clock, bool attitude) {
   return json;
 }
 
+/// The largest error over its level, any axis: what a plot must not lose.
+double exceedance(const BoundedError& b) {
+  return b.levels.level.empty() ? 0.0 : b.error.cwiseQuotient(b.levels.level.front()).maxCoeff();
+}
+
+/// Errors and their levels, the worst of each bucket of time.
+Json levels_json(const ProtectionScore& p, const Clock& clock) {
+  const std::vector<BoundedError>& all = p.series;
+  const std::size_t risks = p.risks.size();
+  Json t = Json::array(), names = Json::array();
+  std::vector<Json> error(kProtectedAxes, Json::array()), level(kProtectedAxes * risks, Json::array());
+  const std::size_t bucket = (all.size() + kMaxSamples - 1) / kMaxSamples;
+  for (std::size_t begin = 0; begin < all.size(); begin += bucket) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto last = all.begin() + static_cast<std::ptrdiff_t>(std::min(begin + bucket, all.size()));
+    const auto worst = std::max_element(
+        first, last, [](const BoundedError& a, const BoundedError& b) { return exceedance(a) < exceedance(b); });
+    t.push_back(clock(worst->levels.pose_us));
+    for (std::size_t a = 0; a < kProtectedAxes; ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      error[a].push_back(fixed(worst->error(axis), 4));
+      for (std::size_t r = 0; r < risks; ++r) level[a * risks + r].push_back(fixed(worst->levels.level[r](axis), 4));
+    }
+  }
+  for (const RiskScore& r : p.risks) names.push_back(r.risk);
+  Json axes = Json::array();
+  for (std::size_t a = 0; a < kProtectedAxes; ++a) {
+    Json levels = Json::array();
+    for (std::size_t r = 0; r < risks; ++r) levels.push_back(level[a * risks + r]);
+    axes.push_back({{"error_m", error[a]}, {"level_m", levels}});
+  }
+  const Eigen::Vector3d& limit = all.front().levels.alert_limit;
+  return {{"t", t}, {"risks", names}, {"alert_limit_m", {limit.x(), limit.y(), limit.z()}}, {"axes", axes}};
+}
+
 template <class Points, class Position>
 Json path_json(const Points& points, const Clock& clock, const Position& position) {
   Json t = Json::array(), x = Json::array(), y = Json::array();
@@ -95,10 +130,12 @@ Json channel_plots(const ChannelScore& c, const Clock& clock) {
   for (const PresenceSpan& span : c.availability.spans) {
     spans.push_back({clock(span.begin_us), clock(span.end_us), static_cast<int>(span.presence)});
   }
-  return {{"channel", c.channel},
-          {"series", series_json(c, clock, c.axes.yaw.has_value())},
-          {"path", path_json(usable, clock, [](const PathPoint& point) { return point.p; })},
-          {"presence", spans}};
+  Json json = {{"channel", c.channel},
+               {"series", series_json(c, clock, c.axes.yaw.has_value())},
+               {"path", path_json(usable, clock, [](const PathPoint& point) { return point.p; })},
+               {"presence", spans}};
+  if (c.protection) json["levels"] = levels_json(*c.protection, clock);
+  return json;
 }
 
 /// Mode probability and channel weights, thinned to what a plot can show.
@@ -131,6 +168,7 @@ Json plots_json(const EvaluationReport& report) {
   return {{"start", iso_time(report.facts.first_fix_us)},
           {"scored", {clock(begin_us), clock(end_us)}},
           {"outages", outages},
+          {"bins", {{"first", BoundHistogram::kFirst}, {"per_decade", BoundHistogram::kPerDecade}}},
           {"reference", path_json(report.reference.trajectory.poses, clock,
                                   [](const Odometry& pose) { return pose.T_frame_vehicle.p; })},
           {"fusion", fusion_json(report.fusion, clock)},

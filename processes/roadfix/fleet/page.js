@@ -6,32 +6,12 @@ const columns = ["horizontal RMSE m", "horizontal 95 % m", "vertical RMSE m", "y
 const finished = data.tasks.filter((t) => t.status === "ok");
 const valuesOf = (name, column) => finished.map((t) => (t.channels[name] || [])[column]).filter((v) => v !== null && v !== undefined);
 
-/** Axes with both scales logarithmic in x, linear or logarithmic in y; returns the plot's place and its scales. */
-function frame(host, { low, high, yLow, yHigh, logY, label, height = 260 }) {
-  host.textContent = "";
-  const width = Math.max(260, host.clientWidth), left = 56, right = 12, top = 8, bottom = 26;
-  const x = (v) => left + (Math.log10(v / low) / Math.log10(high / low)) * (width - left - right);
-  const up = logY ? (v) => Math.log10(v / yLow) / Math.log10(yHigh / yLow) : (v) => (v - yLow) / (yHigh - yLow);
-  const y = (v) => height - bottom - up(v) * (height - top - bottom);
-  const svg = node("svg", { viewBox: `0 0 ${width} ${height}`, height, role: "img", "aria-label": label }, host);
-  for (const v of logY ? logTicks(yLow, yHigh) : ticks(yLow, yHigh, height / 50)) {
-    node("line", { x1: left, x2: width - right, y1: y(v), y2: y(v), class: "gridline" }, svg);
-    node("text", { x: left - 6, y: y(v) + 4, "text-anchor": "end", class: "tick" }, svg, String(+v.toPrecision(3)));
-  }
-  for (const v of logTicks(low, high)) {
-    node("line", { x1: x(v), x2: x(v), y1: top, y2: height - bottom, class: "gridline" }, svg);
-    node("text", { x: x(v), y: height - 8, "text-anchor": "middle", class: "tick" }, svg, String(+v.toPrecision(2)));
-  }
-  node("line", { x1: left, x2: width - right, y1: height - bottom, y2: height - bottom, class: "axis" }, svg);
-  return { svg, x, y, width, height };
-}
-
 /** Cumulative shares of several sets over a logarithmic axis. */
 function shares(host, sets, label, line) {
   const all = sets.flatMap((s) => s.values).filter((v) => v > 0);
   if (!all.length) { host.textContent = "nothing to show"; return; }
   const low = 10 ** Math.floor(Math.log10(all.reduce((a, b) => Math.min(a, b)))), high = Math.max(low * 10, 10 ** Math.ceil(Math.log10(all.reduce((a, b) => Math.max(a, b)))));
-  const { svg, x, y } = frame(host, { low, high, yLow: 0, yHigh: 1, label });
+  const { svg, x, y } = logFrame(host, { low, high, yLow: 0, yHigh: 1, label });
   if (line !== undefined && line > low && line < high) node("line", { x1: x(line), x2: x(line), y1: y(0), y2: y(1), stroke: "var(--muted)", "stroke-dasharray": "5 4" }, svg);
   for (const set of sets) {
     const sorted = set.values.slice().sort((a, b) => a - b);
@@ -51,16 +31,7 @@ function drawBounds() {
   const host = byId("bounds"), [name, which] = byId("bound-channel").value.split(" "), channel = (data.channels[name] || { bounds: [] }).bounds[which];
   if (!channel || !channel.cells.length) { host.textContent = "nothing to show"; return; }
   byId("bound-facts").textContent = `Bound: ${channel.bound}; ${channel.exceeded} of ${channel.samples} above it (${(100 * channel.exceeded / channel.samples).toPrecision(2)} %).`;
-  const edge = (bin) => data.bins.first * 10 ** (bin / data.bins.per_decade);
-  const bins = channel.cells.flatMap((c) => [c[0], c[1]]);
-  const first = bins.reduce((a, b) => Math.min(a, b)), last = bins.reduce((a, b) => Math.max(a, b)) + 1;
-  const { svg, x, y } = frame(host, { low: edge(first), high: edge(last), yLow: edge(first), yHigh: edge(last), logY: true, label: "Errors against bounds", height: 420 });
-  const most = channel.cells.reduce((m, c) => Math.max(m, c[2]), 1);
-  for (const [error, bound, count] of channel.cells) {
-    const rect = node("rect", { x: x(edge(bound)), y: y(edge(error + 1)), width: x(edge(bound + 1)) - x(edge(bound)), height: y(edge(error)) - y(edge(error + 1)), fill: error > bound ? "var(--invalid)" : "#2f6fed", opacity: 0.15 + 0.85 * Math.log1p(count) / Math.log1p(most) }, svg);
-    node("title", {}, rect, `error ${digits(edge(error))} m, bound ${digits(edge(bound))} m: ${count}`);
-  }
-  node("line", { x1: x(edge(first)), y1: y(edge(first)), x2: x(edge(last)), y2: y(edge(last)), stroke: "var(--ink)" }, svg);
+  stanford(host, channel.cells, data.bins, 420);
 }
 
 let order = { column: 0, down: true };

@@ -51,6 +51,20 @@ TEST_CASE("protection score: misleading in any axis, available within the limits
   CHECK(score->longest_misled_s == Approx(0.1));
 }
 
+TEST_CASE("protection score: the series has every sample with its error; levels of other risks are left out") {
+  std::vector<ProtectionSample> levels = {sample(0, 0.1, 0.2), sample(100'000, 0.1, kUnbounded),
+                                          sample(200'000, 0.1, 0.2)};
+  levels[2].risk = {1e-3};
+  levels[2].level.pop_back();
+  const std::vector<PoseError> errors = {error(0, {0.05, -0.07, 0.0}), error(100'000, {0.0, 0.0, 0.0}),
+                                         error(200'000, {0.0, 0.0, 0.0})};
+  const auto score = protection_score(levels, errors, 0.0);
+  REQUIRE(score);
+  REQUIRE(score->series.size() == 2);
+  CHECK(score->series[0].error == Eigen::Vector3d(0.05, 0.07, 0.0));
+  CHECK(score->series[1].levels.pose_us == 100'000);
+}
+
 TEST_CASE("protection score: the reference's own error widens a level as far as it can explain") {
   const std::vector<ProtectionSample> levels = {sample(0, 0.1, 0.2)};
   const std::vector<PoseError> errors = {error(0, {0.3, 0.0, 0.0})};

@@ -5,6 +5,7 @@
 #include "bus/log/log_reader.h"
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/evaluate/report.h"
+#include "roadfix/protection_level_t.hpp"
 #include "unit/processes/roadfix/evaluate/small_log.h"
 
 namespace roadfix {
@@ -36,6 +37,7 @@ EvaluationReport evaluate_all(const std::filesystem::path& path) {
     input.channel = channel;
     input.local_frame = stream.local_frame;
     input.trajectory = stream.trajectory;
+    input.protection = log.protection[channel];
     report.channels.push_back(evaluate_channel(report.reference, report.facts, input, {}));
   }
   return report;
@@ -77,6 +79,55 @@ TEST_CASE("a log is read back to the figures that were put in") {
   CHECK(page.find("<h1>small &lt;drive></h1>") != std::string::npos);
   CHECK(page.find("http://") == page.find("http://www.w3.org/2000/svg"));  // nothing to fetch
   CHECK(page.find("https://") == std::string::npos);
+}
+
+/// The page's data: what stands between `begin` and the next end of a script element.
+nlohmann::json page_data(const std::string& page, const std::string& id) {
+  const std::string begin = "id=\"" + id + "\">";
+  const std::size_t at = page.find(begin);
+  REQUIRE(at != std::string::npos);
+  const std::size_t from = at + begin.size();
+  return nlohmann::json::parse(page.substr(from, page.find("</script>", from) - from));
+}
+
+TEST_CASE("the page has errors beside their protection levels over time, and Stanford diagrams of each axis") {
+  const Folder folder("levels");
+  const SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    small.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
+      m.position_m[2] += t_s > 100.0 && t_s < 101.0 ? 3.0 : 0.25;
+      protection_level_t level{};
+      level.utime = level.pose_utime = m.utime;
+      level.num_risks = 2;
+      level.risk = {1e-3, 1e-5};
+      level.along_m = {0.5, 0.9};
+      level.across_m = {0.2, 0.3};
+      level.up_m = {1.0, t_s < 50.0 ? INFINITY : 2.0};
+      level.alert_along_m = 1.4;
+      level.alert_across_m = 0.57;
+      level.alert_up_m = 1.3;
+      writer.write("PROTECTION_INS", m.utime, encode(level));
+    });
+    writer.commit();
+  }
+  const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  const std::string page = report_page(report);
+  const nlohmann::json plots = page_data(page, "plots"), channel = plots["channels"][0], levels = channel["levels"];
+  CHECK(levels["risks"] == nlohmann::json{1e-3, 1e-5});
+  CHECK(levels["alert_limit_m"] == nlohmann::json{1.4, 0.57, 1.3});
+  const nlohmann::json &up = levels["axes"][2], &error = up["error_m"];
+  CHECK(up["level_m"][1].front().is_null());  // infinite
+  CHECK(up["level_m"][1].back() == 2.0);
+  CHECK(levels["axes"][1]["level_m"][0].back() == 0.2);
+  CHECK(error.back() == 0.25);
+  CHECK(std::count(error.begin(), error.end(), 3.0) > 0);  // a second of it survives the thinning
+  CHECK(error.size() <= 2500);
+  const nlohmann::json risk = page_data(page, "figures")["channels"]["POSE_INS"]["protection"]["risks"][0];
+  CHECK(risk["stanford"].size() == 3);
+  CHECK(risk["misleading_by_axis"][2] > 0);
+  CHECK(plots["bins"]["per_decade"] == 8);
 }
 
 TEST_CASE("an estimate without covariance is said to have none") {
