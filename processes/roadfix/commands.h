@@ -15,6 +15,7 @@ void add_fleet_command(CLI::App& app);
 void add_import_command(CLI::App& app);
 void add_kalibr_command(CLI::App& calibrate);
 void add_log_command(CLI::App& app);
+void add_paper_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);

@@ -84,6 +84,9 @@ Replayer::Replayer(const std::filesystem::path& in, const std::filesystem::path&
   }
   index_ = index_logs({&reader_}, [&](std::string_view channel) {
     const std::string name(channel);
+    if (std::find(options.ignored_channels.begin(), options.ignored_channels.end(), name) !=
+        options.ignored_channels.end())
+      return false;
     const bool is_read = routes_.contains(name) && (options_.from_s || !producers_.contains(name));
     return is_read || is_copied(name) || (options_.from_s && name.starts_with("STATE_"));
   });

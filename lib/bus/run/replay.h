@@ -18,6 +18,8 @@ namespace roadfix {
 struct ReplayOptions {
   /// Of the input log, copied to the output where they are there: what an evaluation needs beside the estimates.
   std::vector<std::string> copied_channels = {"CONFIG_DRIVE", "REFERENCE"};
+  /// As if the log did not have them: what a receiver or an earlier run gave and this one is not to know.
+  std::vector<std::string> ignored_channels;
   bool timing = false;
   bool to_disk = true;  ///< wait until the disk has the output
   /// Begins each stage at its last recorded snapshot up to so many seconds into the log.

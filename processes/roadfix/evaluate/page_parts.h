@@ -1,4 +1,4 @@
-/// The parts of the report page, embedded from page.html, page.css and page.js, and what all report pages draw with.
+/// The parts of the report page, embedded from page.html, page.css and the scripts, and what all report pages draw with.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,6 +11,7 @@ extern const char* const kPageHtml;
 extern const char* const kPageCss;
 extern const char* const kPageJs;
 extern const char* const kDrawJs;
+extern const char* const kTimePlotJs;
 
 /// Puts a value in place of `@KEY@`.
 void replace_all(std::string& text, std::string_view key, const std::string& value);

@@ -211,7 +211,7 @@ std::string report_page(const EvaluationReport& report) {
   replace_all(page, "@TITLE@", html_safe(name));
   replace_all(page, "@CSS@", kPageCss);
   replace_all(page, "@TABLE@", html_safe(report_table(report)));
-  replace_all(page, "@JS@", std::string(kDrawJs) + kPageJs);
+  replace_all(page, "@JS@", std::string(kDrawJs) + kTimePlotJs + kPageJs);
   replace_all(page, "@PLOTS@", script_safe(plots_json(report)));
   replace_all(page, "@FIGURES@", script_safe(report_json(report)));
   return page;

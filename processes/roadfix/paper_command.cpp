@@ -1,0 +1,101 @@
+// roadfix paper: the tables and figures of the papers that Roadfix starts from, for any drive.
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "config/config_error.h"
+#include "geometry/frames.h"
+#include "roadfix/commands.h"
+#include "roadfix/common_options.h"
+#include "roadfix/console.h"
+#include "roadfix/paper/paper_b.h"
+#include "roadfix/paper/paper_c.h"
+
+namespace roadfix {
+namespace {
+
+struct Options {
+  PaperRequest drive;
+  double turn_degps = 3.0;
+  double least_turn_deg = 45.0;
+  PrintedLocalizationConfig scheme;  ///< of Ock et al. (2020)
+  OutputOption out;                  ///< a folder
+  bool progress = false;
+};
+
+using Experiment = PaperReport (*)(const Options&);
+
+void run(const std::string& letter, Experiment experiment, Options& options) {
+  const std::filesystem::path& drive = options.drive.drive;
+  std::filesystem::path folder = options.out.path;
+  if (folder.empty()) folder = drive.parent_path() / (drive.stem().string() + "-paper-" + letter);
+  const std::filesystem::path page = folder / "paper.html";
+  options.out.refuse_existing_file(page, drive);
+  options.drive.turn_threshold = options.turn_degps * kDegree;
+  ProgressLine progress("paper " + letter, options.progress);
+  options.drive.progress = [&progress](double share) { progress.show(share); };
+  const PaperReport report = experiment(options);
+  progress.end_line();
+  for (const PaperTable& table : report.tables) write_text_file(folder / (table.name + ".csv"), paper_csv(table));
+  write_text_file(page, paper_page(report));
+  std::cout << paper_text(report) << page.string() << "\n";
+}
+
+CLI::App* add_experiment(CLI::App& paper, const std::string& letter, const std::string& what, Experiment experiment,
+                         const std::shared_ptr<Options>& options) {
+  CLI::App* command = paper.add_subcommand(letter, what);
+  command->add_option("drive", options->drive.drive, "Drive log with REFERENCE")->required()->check(CLI::ExistingFile);
+  add_config(*command, options->drive.vehicle);
+  add_output(*command, options->out,
+             "Folder for the page and the CSV files; DRIVE-paper-" + letter + " where not given")
+      ->required(false);
+  add_progress(*command, options->progress);
+  command->callback([=] { run(letter, experiment, *options); });
+  return command;
+}
+
+void add_turn_rate(CLI::App& command, Options& options, const std::string& what) {
+  command.add_option("--turn-degps", options.turn_degps, what)->check(CLI::Range(0.0, 1000.0))->capture_default_str();
+}
+
+void add_paper_b(CLI::App& paper) {
+  const auto options = std::make_shared<Options>();
+  const auto experiment = [](const Options& o) { return paper_b({o.drive, o.scheme, o.least_turn_deg * kDegree}); };
+  CLI::App* command = add_experiment(
+      paper, "b", "Ock et al. (2020): vision alone, wheels, their scheme and the default without GNSS; figures 8 to 11",
+      experiment, options);
+  command
+      ->add_option("--threshold", options->scheme.threshold,
+                   "m rad, of the disagreement (14); the paper gives none. About 2 m together with 4 deg")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option("--restart-every-s", options->scheme.restart_every, "least time between two restarts of the vision")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command->add_option("--least-turn-deg", options->least_turn_deg, "angle from which a turn is in figure 8")
+      ->check(CLI::Range(1.0, 1e4))
+      ->capture_default_str();
+  add_turn_rate(*command, *options, "yaw rate from which the vehicle turns");
+}
+
+void add_paper_c(CLI::App& paper) {
+  const auto options = std::make_shared<Options>();
+  const auto experiment = [](const Options& o) { return paper_c(o.drive); };
+  CLI::App* command = add_experiment(
+      paper, "c", "Lee et al. (2025): tables 1 and 2, the fusion as printed, each part left out, and the default",
+      experiment, options);
+  command->add_flag("--again", options->drive.again, "Run the estimators although the drive has their poses");
+  add_turn_rate(*command, *options, "yaw rate that counts as a turn (MPA)");
+}
+
+}  // namespace
+
+void add_paper_command(CLI::App& app) {
+  CLI::App* paper = app.add_subcommand("paper", "The tables and figures of the papers, for any drive");
+  paper->require_subcommand(1);
+  add_paper_b(*paper);
+  add_paper_c(*paper);
+}
+
+}  // namespace roadfix

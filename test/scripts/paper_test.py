@@ -1,0 +1,99 @@
+"""roadfix paper on the first 20 s of the demo drive, as a user calls it. Arguments: repository, roadfix program."""
+import csv
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+PROGRAM = Path(sys.argv.pop(2)).resolve()
+ROOT = Path(sys.argv.pop(1)).resolve()
+VEHICLE = ROOT / "configs/demo"
+
+
+def roadfix(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=600)
+
+
+def rows_of(path):
+    with open(path, newline="") as file:
+        return {row[0]: row[1:] for row in csv.reader(file)}
+
+
+class Paper(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = Path(cls.temporary.name)
+        cls.drive = cls.folder / "drive.lcm"
+        done = roadfix("log", "cut", ROOT / "logs/demo.lcm", "--to-s", "20", "--out", cls.drive)
+        if done.returncode != 0:
+            raise RuntimeError(done.stderr)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def run_paper(self, letter, *flags):
+        """Standard output and the folder; what every experiment leaves is checked here."""
+        out = self.folder / letter
+        words = ("paper", letter, self.drive, "--config", VEHICLE, "--out", out, *flags)
+        done = roadfix(*words)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(done.stdout.splitlines()[-1], str(out / "paper.html"))
+        page = (out / "paper.html").read_text()
+        for fetching in ("<link", "src=", "@import", "fetch(", "https://", "@DATA@"):
+            self.assertNotIn(fetching, page)
+        again = roadfix(*words)
+        self.assertEqual(again.returncode, 2)
+        self.assertIn("paper.html: is there already; --overwrite replaces it", again.stderr)
+        return done.stdout, out
+
+    def test_b(self):
+        text, out = self.run_paper("b", "--least-turn-deg", "15")
+        rows = rows_of(out / "table_accuracy.csv")
+        self.assertEqual(list(rows), ["estimate", "vision alone", "wheels and IMU", "modified, (14), (15)", "default, Mahalanobis"])
+        for name in list(rows)[1:]:
+            self.assertIn(name, text)
+            self.assertLess(float(rows[name][0]), 5.0, name)  # 250 m
+        seconds = rows_of(out / "errors_by_time.csv")
+        self.assertGreater(len(seconds), 15)
+        self.assertNotIn("errors_by_time", text)
+        self.assertEqual(len(rows_of(out / "figure_8.csv")), 2)  # one turn of 28 deg
+        # A threshold of nothing refuses every picture: the scheme is the wheels.
+        done = roadfix("paper", "b", self.drive, "--config", VEHICLE, "--out", out, "--overwrite", "--threshold", "0")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        strict = rows_of(out / "table_accuracy.csv")
+        self.assertEqual(strict["modified, (14), (15)"][2], strict["wheels and IMU"][2])
+        self.assertNotEqual(rows["modified, (14), (15)"][2], rows["wheels and IMU"][2])
+        self.assertGreater(int(strict["modified, (14), (15)"][7]), 0)
+
+    def test_c(self):
+        text, out = self.run_paper("c")
+        accuracy, transitions = rows_of(out / "table_1.csv"), rows_of(out / "table_2.csv")
+        self.assertEqual(len(accuracy), 12)
+        self.assertEqual(len(transitions), 10)
+        self.assertIn("no GNSS outage", text)
+        self.assertEqual(transitions["literal"][0], "")
+        self.assertEqual(transitions["literal, one model"][3], "")
+        self.assertNotEqual(accuracy["fusion, literal"], accuracy["fusion, literal, fixed R"])
+        # Of poses that are recorded the same tables come out.
+        poses = self.folder / "poses.lcm"
+        stages = "gnss_ins_ekf,vo_tracker,wheel_odometry"
+        self.assertEqual(roadfix("replay", self.drive, "--stages", stages, "--config", VEHICLE, "--out", poses).returncode, 0)
+        again = roadfix("paper", "c", poses, "--config", VEHICLE, "--out", self.folder / "recorded")
+        self.assertEqual(again.returncode, 0, again.stderr)
+        self.assertEqual(rows_of(self.folder / "recorded/table_1.csv"), accuracy)
+
+    def test_a_channel_that_is_missing_is_named(self):
+        blind = self.folder / "blind.lcm"
+        self.assertEqual(roadfix("log", "filter", self.drive, "--channel", "CAMERA.*", "--invert", "--out", blind).returncode, 0)
+        for letter in "bc":
+            done = roadfix("paper", letter, blind, "--config", VEHICLE, "--out", self.folder / "blind")
+            self.assertEqual(done.returncode, 2)
+            self.assertRegex(done.stderr, rf"^roadfix paper {letter}: .*blind\.lcm: no messages on channel CAMERA_LEFT, which .*\(there are .*GNSS.*\)\n$")
+            self.assertFalse((self.folder / "blind").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
