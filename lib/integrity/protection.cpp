@@ -57,6 +57,7 @@ void ProtectionMonitor::add(const PositionInnovation& z) {
   innovation_weight_ += 1.0;
   fix_variance_ = z.variance;
   fix_us_ = z.t_us;
+  separation_.set_position_time(z.t_us);
 }
 
 bool ProtectionMonitor::coasting_since(int64_t t_us) const {
@@ -152,15 +153,14 @@ void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out
 
 // (P.4.7)
 void ProtectionMonitor::apply_receiver(Protection& out) const {
-  const std::optional<Anchor> anchor = separation_.before(config_.witness.short_lag);
-  if (!anchor) return;
-  const Separation s = separation_.since(*anchor);
+  if (!sound_) return;
+  const Separation s = separation_.since(*sound_);
   const std::array<double, kRisks> risks = {config_.frequent_risk, config_.rare_risk};
   for (int r = 0; r < kRisks; ++r) {
     const double risk = std::min(0.5, risks[static_cast<std::size_t>(r)] / (kAxes * config_.fault_prior));
     Eigen::Vector3d level;
     for (int a = 0; a < 3; ++a) {
-      const double own = noise_.quantile(out.pose_us, risk) * std::sqrt(std::max(0.0, anchor->cov(a, a)));
+      const double own = noise_.quantile(out.pose_us, risk) * std::sqrt(std::max(0.0, sound_->cov(a, a)));
       level(a) = std::abs(s.d(a)) + std::hypot(own, separation_.quantile(a, risk) * s.sigma(a));
     }
     raise(r, level, Hypothesis::kReceiver, out);
@@ -226,7 +226,8 @@ Protection ProtectionMonitor::bound(const Odometry& estimate) {
     out.hypothesis = Hypothesis::kNoBound;
   } else {
     apply_no_fault(estimate, out);
-    if (!anchored_) apply_receiver(out);
+    if (!anchored_) sound_ = separation_.before(config_.witness.short_lag);
+    if (!anchored_ || returned_) apply_receiver(out);
     apply_anchor(out);
     apply_coasting(out);
   }

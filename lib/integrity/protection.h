@@ -74,6 +74,11 @@ class ProtectionMonitor {
       self.refused_us_, self.failed_us_, self.first_us_, self.checked_us_, self.turning_, self.fix_way_, self.anchored_,
       self.returned_);
     Anchor::archive(self.anchor_, a);
+    Anchor sound = self.sound_.value_or(Anchor{});
+    bool known = self.sound_.has_value();
+    a(known);
+    Anchor::archive(sound, a);
+    if constexpr (Archive::kReads) self.sound_ = known ? std::optional<Anchor>(sound) : std::nullopt;
   }
 
  private:
@@ -102,8 +107,9 @@ class ProtectionMonitor {
   double turning_ = 0.0;  ///< m/s2, the last seconds' largest lateral acceleration, decaying
   double fix_way_ = 0.0;  ///< m, driven until the last position
   bool anchored_ = false;
-  Anchor anchor_;          ///< the pose from before positions became suspect, (P.5.n)
-  bool returned_ = false;  ///< the anchor is an outage's, not a contradiction's
+  std::optional<Anchor> sound_;  ///< before positions that may have failed unnoticed, (P.4.7)
+  Anchor anchor_;                ///< the pose from before positions became suspect, (P.5.n)
+  bool returned_ = false;        ///< the anchor is an outage's, not a contradiction's
 };
 
 }  // namespace roadfix

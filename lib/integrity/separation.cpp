@@ -91,10 +91,15 @@ Eigen::Vector3d SeparationMonitor::ways_since(const Anchor& anchor) const {
   return {way, now_.bend - anchor.bend, 0.5 * way * seconds_between(anchor.t_us, now_.t_us)};
 }
 
+double SeparationMonitor::unwitnessed_time(const Anchor& anchor) const {
+  const double until_now = seconds_between(anchor.t_us, now_.t_us);
+  if (!position_us_) return until_now;
+  return std::clamp(seconds_between(anchor.t_us, *position_us_) + config_.coasting_after, 0.0, until_now);
+}
+
 // (P.4.1) to (P.4.3)
 Separation SeparationMonitor::since(const Anchor& anchor) const {
   Separation s;
-  const double tau = seconds_between(anchor.t_us, now_.t_us);
   const double way = now_.way - anchor.way;
   const Eigen::Vector3d ways = ways_since(anchor);
   s.witnessed = anchor.witness_track >= 0 && anchor.witness_track == now_.witness_track;
@@ -110,7 +115,7 @@ Separation SeparationMonitor::since(const Anchor& anchor) const {
       const double share = config_.witness.way_std(a);
       s.sigma(a) = std::sqrt(floor + (share * share + turn(a)) * way * way + ways.dot(ratio.cov * ways));
     } else {
-      const double drift = config_.witness.unwitnessed_std(a) * tau;
+      const double drift = config_.witness.unwitnessed_std(a) * unwitnessed_time(anchor);
       s.sigma(a) = std::sqrt(floor + drift * drift);
     }
   }

@@ -48,6 +48,9 @@ class SeparationMonitor {
   /// The newest pose of the witness; `jumps` differs where it began anew.
   void add_witness(const Odometry& pose, int64_t jumps);
 
+  /// Of the newest position that the estimate used: what nothing but the receiver would show ends with its positions.
+  void set_position_time(int64_t t_us) { position_us_ = t_us; }
+
   /// Takes the estimate's newest pose; the separations below are at it.
   void step(const Odometry& estimate);
 
@@ -68,7 +71,7 @@ class SeparationMonitor {
     auto& w = self.witness_;
     a(w.t_us, w.p, w.yaw, w.velocity, w.jumps, w.track);
     Anchor::archive(self.now_, a);
-    a(self.started_, self.step_, self.velocity_, self.R_vehicle_frame_);
+    a(self.position_us_, self.started_, self.step_, self.velocity_, self.R_vehicle_frame_);
     auto count = static_cast<int64_t>(self.anchors_.size());
     a(count);
     if constexpr (Archive::kReads) self.anchors_.resize(static_cast<std::size_t>(count));
@@ -93,6 +96,8 @@ class SeparationMonitor {
     Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
   };
   [[nodiscard]] Eigen::Vector3d ways_since(const Anchor& anchor) const;
+  /// s, for which the receiver may have drifted since, (P.4.8).
+  [[nodiscard]] double unwitnessed_time(const Anchor& anchor) const;
   /// The separation over one of the two lags, and the way that it is over.
   struct Lagged {
     Separation separation;
@@ -104,6 +109,7 @@ class SeparationMonitor {
   IntegrityConfig config_;
   Witness witness_;
   Anchor now_;
+  std::optional<int64_t> position_us_;
   bool started_ = false;
   double step_ = 0.0;                                              ///< s, between the last two poses
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();             ///< m/s, the estimate's, in its frame

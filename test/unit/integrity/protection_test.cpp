@@ -60,11 +60,11 @@ CarOptions displaced_return() {
   return options;
 }
 
-void check_never_smaller(const std::vector<CarSample>& less, const std::vector<CarSample>& more) {
+void check_never_smaller(const std::vector<CarSample>& less, const std::vector<CarSample>& more, double from = 0.0) {
   REQUIRE(less.size() == more.size());
   int smaller = 0;
   for (std::size_t i = 0; i < less.size(); ++i) {
-    for (std::size_t r = 0; r < kRisks; ++r)
+    for (std::size_t r = 0; r < kRisks && less[i].t >= from; ++r)
       smaller += (less[i].protection.level[r].array() < more[i].protection.level[r].array()).any() ? 1 : 0;
   }
   CHECK(smaller == 0);
@@ -116,17 +116,19 @@ TEST_CASE("protection: less information is never a smaller level") {
   CarOptions even;
   even.even = true;
   const std::vector<CarSample> all = drive(even, {});
-  CarOptions wider = even, seldom = even, alone = even;
+  CarOptions wider = even, seldom = even, alone = even, later_alone = even, outage = even;
   wider.claim = 2.0;
   seldom.every_fix_s = 3.4;
   alone.witness = false;
+  later_alone.witness_until = 80.0;
+  outage.fixes = [](double t) { return t < 100.0; };
   check_never_smaller(drive(wider, {}), all);
   check_never_smaller(drive(alone, {}), all);
-  const std::vector<CarSample> few = drive(seldom, {});
+  check_never_smaller(drive(later_alone, {}), all, 80.3);  // the last pose of a witness holds for 0.2 s
+  const std::vector<CarSample> few = drive(seldom, {}), silent = drive(outage, {});
+  check_never_smaller(few, all);
+  check_never_smaller(silent, all);
   CHECK(few.back().protection.level[kRare].x() > all.back().protection.level[kRare].x());
-  CarOptions outage;
-  outage.fixes = [](double t) { return t < 100.0; };
-  const std::vector<CarSample> silent = drive(outage, {});
   for (std::size_t i = 1100; i < silent.size(); ++i) {
     for (int a = 0; a < 3; ++a) {
       CHECK(silent[i].protection.level[kRare](a) >= silent[i - 1].protection.level[kRare](a) * (1.0 - 1e-12));

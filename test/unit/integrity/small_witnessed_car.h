@@ -15,9 +15,10 @@ struct CarOptions {
   uint64_t seed = 1;
   double seconds = 200.0;
   bool witness = true;
-  double sigma = 0.02;      ///< m, of the estimate's errors
-  double claim = 1.0;       ///< of which this share is claimed
-  double innovation = 1.0;  ///< sigma of innovations over what is claimed
+  double witness_until = 1e9;  ///< s
+  double sigma = 0.02;         ///< m, of the estimate's errors
+  double claim = 1.0;          ///< of which this share is claimed
+  double innovation = 1.0;     ///< sigma of innovations over what is claimed
   double every_fix_s = 0.2;
   bool even = false;  ///< innovations of exactly that size, of alternating sign
   std::function<Eigen::Vector3d(double)> fault = [](double) { return Eigen::Vector3d::Zero().eval(); };  ///< m, enu
@@ -77,7 +78,8 @@ inline std::vector<CarSample> drive(const CarOptions& options, const IntegrityCo
     reckoned_yaw += kStep * (rate + 5e-4);
     reckoned += 1.008 * 15.0 * kStep * Eigen::Vector3d(std::cos(reckoned_yaw), std::sin(reckoned_yaw), 0.0);
     error = 0.98 * error + std::sqrt(1.0 - 0.98 * 0.98) * options.sigma * noise.normal3();
-    if (options.witness) monitor.add_witness(pose(t_us, reckoned, reckoned_yaw, rate, 0.1), 0);
+    if (options.witness && t < options.witness_until)
+      monitor.add_witness(pose(t_us, reckoned, reckoned_yaw, rate, 0.1), 0);
     if (options.fixes(t) && t >= next_fix) {
       next_fix = t + options.every_fix_s - 1e-9;
       const double sign = i / 2 % 2 == 0 ? 1.0 : -1.0;
