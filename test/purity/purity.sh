@@ -49,7 +49,7 @@ report 'one name, one type' < <(find lib processes test \( -name '*.h' -o -name 
   }')
 
 # Equations are numbered (X.section.n), X the letter of the library, in order; what the code cites is in its MODEL.md.
-numbering=(wheel:W slam:S simulation:D camera:K health:H evaluation:E features:T integrity:P)
+numbering=(inertial:I vehicle:V wheel:W slam:S simulation:D camera:K health:H evaluation:E features:T integrity:P)
 for entry in "${numbering[@]}"; do
   library=${entry%:*} letter=${entry#*:} model=lib/${entry%:*}/MODEL.md
   [[ -f $model ]] || continue
