@@ -8,6 +8,7 @@
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "roadfix/console.h"
+#include "roadfix/paper/paper_a.h"
 #include "roadfix/paper/paper_b.h"
 #include "roadfix/paper/paper_c.h"
 
@@ -18,6 +19,7 @@ struct Options {
   PaperRequest drive;
   double turn_degps = 3.0;
   double least_turn_deg = 45.0;
+  PaperARequest trajectory;          ///< of Kim and Kang (2025), but the drive
   PrintedLocalizationConfig scheme;  ///< of Ock et al. (2020)
   OutputOption out;                  ///< a folder
   bool progress = false;
@@ -58,6 +60,38 @@ void add_turn_rate(CLI::App& command, Options& options, const std::string& what)
   command.add_option("--turn-degps", options.turn_degps, what)->check(CLI::Range(0.0, 1000.0))->capture_default_str();
 }
 
+void add_sigma(CLI::App& command, const std::string& name, double& value, const std::string& what) {
+  command.add_option(name, value, what)->check(CLI::Range(1e-6, 1e6))->capture_default_str();
+}
+
+void add_paper_a(CLI::App& paper) {
+  const auto options = std::make_shared<Options>();
+  options->trajectory.front_ends = classic_front_ends();
+  const auto experiment = [](const Options& o) {
+    PaperARequest request = o.trajectory;
+    request.drive = o.drive;
+    return paper_a(request);
+  };
+  CLI::App* command = add_experiment(
+      paper, "a", "Kim and Kang (2025): table 1, each front end with and without their EKF; figures 4 and 6 to 8",
+      experiment, options);
+  PaperARequest& request = options->trajectory;
+  command->add_option("--front-end", request.front_ends, "Front ends, separated by commas")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(all_front_ends()))
+      ->capture_default_str();
+  command
+      ->add_option("--network-model", request.network_model,
+                   "ONNX file of a learned front end, in place of the configuration's")
+      ->check(CLI::ExistingFile);
+  add_sigma(*command, "--process-sigma-m", request.literal.process_sigma, "of the filter as printed");
+  add_sigma(*command, "--measurement-sigma-m", request.literal.measurement_sigma, "of the filter as printed");
+  add_sigma(*command, "--position-sigma-m", request.motion.position_sigma, "of the filter with a motion model");
+  add_sigma(*command, "--speed-change-mps2-per-rthz", request.motion.speed_change, "likewise");
+  add_sigma(*command, "--turn-change-radps2-per-rthz", request.motion.turn_change, "likewise");
+}
+
 void add_paper_b(CLI::App& paper) {
   const auto options = std::make_shared<Options>();
   const auto experiment = [](const Options& o) { return paper_b({o.drive, o.scheme, o.least_turn_deg * kDegree}); };
@@ -94,6 +128,7 @@ void add_paper_c(CLI::App& paper) {
 void add_paper_command(CLI::App& app) {
   CLI::App* paper = app.add_subcommand("paper", "The tables and figures of the papers, for any drive");
   paper->require_subcommand(1);
+  add_paper_a(*paper);
   add_paper_b(*paper);
   add_paper_c(*paper);
 }

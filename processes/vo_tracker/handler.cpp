@@ -31,15 +31,16 @@ std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoT
   return std::make_unique<KeyframeStage>(calibration, config, superpoint_weights);
 }
 
+std::vector<uint8_t> network_weights(const std::filesystem::path& vehicle_dir, const VoTrackerConfig& config) {
+  const std::string& model = config.network_model.empty() ? config.superpoint_model : config.network_model;
+  if (model.empty()) return {};
+  const std::string bytes = read_text_file(vehicle_dir / model, std::size_t{1} << 28U);
+  return {bytes.begin(), bytes.end()};
+}
+
 std::unique_ptr<Stage> make_vo_tracker(const std::filesystem::path& vehicle_dir) {
   const auto config = load_config_or_defaults<VoTrackerConfig>(vehicle_dir / "vo_tracker.yaml");
-  std::vector<uint8_t> weights;
-  const std::string& model = config.network_model.empty() ? config.superpoint_model : config.network_model;
-  if (!model.empty()) {
-    const std::string bytes = read_text_file(vehicle_dir / model, std::size_t{1} << 28U);
-    weights.assign(bytes.begin(), bytes.end());
-  }
-  return make_vo_tracker(load_calibration(vehicle_dir), config, weights);
+  return make_vo_tracker(load_calibration(vehicle_dir), config, network_weights(vehicle_dir, config));
 }
 
 }  // namespace roadfix

@@ -64,6 +64,9 @@ void visit(VoTrackerConfig& c, Visitor& v) {
 /// rig of unknown orientation (EuRoC): msckf too, which levels itself by gravity. Otherwise keyframe.
 VoMode mode_for(const Calibration& calibration);
 
+/// The bytes of the network that the configuration names; empty where it names none. ConfigError where the file cannot be read.
+std::vector<uint8_t> network_weights(const std::filesystem::path& vehicle_dir, const VoTrackerConfig& config);
+
 /// `superpoint_weights`: the bytes of superpoint_model. Throws on a missing or incomplete camera calibration.
 std::unique_ptr<Stage> make_vo_tracker(const Calibration& calibration, const VoTrackerConfig& config,
                                        const std::vector<uint8_t>& superpoint_weights = {});

@@ -68,7 +68,7 @@ class Runs:
 
     def roadfix(self, *arguments):
         """A subcommand of the tool; what an earlier measurement wrote is replaced."""
-        writes = arguments[0] in ("evaluate", "export", "import", "replay", "simulate") and "--out" in arguments
+        writes = arguments[0] in ("evaluate", "export", "import", "paper", "replay", "simulate") and "--out" in arguments
         replace = ("--overwrite",) if writes and "--overwrite" not in arguments else ()
         return self.call(self.program("roadfix"), *arguments, *replace)
 

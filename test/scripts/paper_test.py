@@ -49,6 +49,23 @@ class Paper(unittest.TestCase):
         self.assertIn("paper.html: is there already; --overwrite replaces it", again.stderr)
         return done.stdout, out
 
+    def test_a(self):
+        text, out = self.run_paper("a", "--front-end", "klt,orb")
+        rows = rows_of(out / "table_1.csv")
+        self.assertEqual(list(rows), ["odometry", *(f"{before}{name}{after}" for name in ("KLT", "ORB")
+                                                    for before, after in (("", ""), ("EKF ", ", literal"), ("EKF ", ", motion model")))])
+        for name in ("KLT", "ORB"):
+            raw, literal, motion = (float(rows[row][0]) for row in (name, f"EKF {name}, literal", f"EKF {name}, motion model"))
+            self.assertAlmostEqual(literal, raw, 6)  # taken literally it is the identity
+            self.assertNotAlmostEqual(motion, raw, 5)
+            self.assertGreater(float(rows[f"EKF {name}, literal"][2]), 0.7)  # trace
+            self.assertLess(float(rows[f"EKF {name}, literal"][3]), 5.0)  # s until it settles
+        self.assertEqual(len(rows_of(out / "sensitivity.csv")), 26)
+        self.assertIn("SuperPoint 2.911", text)
+        done = roadfix("paper", "a", self.drive, "--config", VEHICLE, "--front-end", "superpoint", "--out", self.folder / "learned")
+        self.assertEqual(done.returncode, 2)
+        self.assertRegex(done.stderr, r"^roadfix paper a: superpoint needs a network: --network-model, or network_model in vo_tracker\.yaml\n$")
+
     def test_b(self):
         text, out = self.run_paper("b", "--least-turn-deg", "15")
         rows = rows_of(out / "table_accuracy.csv")
@@ -88,7 +105,7 @@ class Paper(unittest.TestCase):
     def test_a_channel_that_is_missing_is_named(self):
         blind = self.folder / "blind.lcm"
         self.assertEqual(roadfix("log", "filter", self.drive, "--channel", "CAMERA.*", "--invert", "--out", blind).returncode, 0)
-        for letter in "bc":
+        for letter in "abc":
             done = roadfix("paper", letter, blind, "--config", VEHICLE, "--out", self.folder / "blind")
             self.assertEqual(done.returncode, 2)
             self.assertRegex(done.stderr, rf"^roadfix paper {letter}: .*blind\.lcm: no messages on channel CAMERA_LEFT, which .*\(there are .*GNSS.*\)\n$")

@@ -5,6 +5,7 @@
 #include "geometry/frames.h"
 #include "papers/arbitration.h"
 #include "papers/trajectory_ekf.h"
+#include "papers/trajectory_filtering.h"
 #include "simulation/random.h"
 
 namespace roadfix {
@@ -54,6 +55,26 @@ TEST_CASE("Kim and Kang's covariance trace settles at the steady state of its Ri
   // P = (P + q) r / (P + q + r): P^2 + q P - q r = 0.
   const double q = 0.25, r = 1.0, P = 0.5 * (-q + std::sqrt(q * q + 4.0 * q * r));
   CHECK(ekf.covariance_trace() == Approx(2.0 * P));
+}
+
+TEST_CASE("the covariance's trace has settled where it changes by less than a rate, for good") {
+  std::vector<TrajectoryPoint> points;
+  for (int i = 0; i < 200; ++i) points.push_back({0.1 * i, {static_cast<double>(i), 0.0}});
+  const auto literal = filtered(LiteralTrajectoryConfig{0.5, 1.0}, points);
+  REQUIRE(literal.size() == points.size());
+  CHECK((literal.back().position - points.back().position).norm() < 1e-9);
+  const double settled = settling_time(literal).value();
+  CHECK(settled > 0.2);
+  CHECK(settled < 2.0);
+  // A slower rate settles later; a trace that grows at its end never has.
+  CHECK(settling_time(literal, 1e-4).value() > settled);
+  auto growing = literal;
+  growing.back().trace += 1.0;
+  CHECK(!settling_time(growing));
+  CHECK(!settling_time({literal.front()}));
+  const auto motion = filtered(MotionTrajectoryConfig{}, points);
+  CHECK((motion.back().position - points.back().position).norm() < 0.1);
+  CHECK(motion.back().trace < 2.0 * 0.1 * 0.1);
 }
 
 /// RMS errors of a car on a winding road whose odometry has white noise: raw and filtered.
