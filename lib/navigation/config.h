@@ -72,7 +72,7 @@ struct ProcessNoise {
   double gyro_drift_max = 1.0e-3;     ///< rad/s: in-run drift of consumer MEMS gyros; the rest of the spread is turn-on
   double accel_drift_max = 0.05;      ///< m/s2, likewise
   double clock_walk = 5.0e-3;         ///< s/sqrt(s), of imu stamps that are not exact
-  double wheel_scale_walk = 1.3e-5;   ///< 1/sqrt(s): what a tyre that warms up grows in a minute, (N.4.3)
+  double wheel_scale_walk = 1.3e-5;   ///< 1/sqrt(s): what a tyre that warms up grows in a minute, (N.2.5)
   double mounting_walk = 1.0e-5;      ///< rad/sqrt(s)
   double antenna_walk = 4.0e-3;       ///< m/sqrt(s): what the imu's cross axes make of turns
 };

@@ -49,21 +49,24 @@ report 'one name, one type' < <(find lib processes test \( -name '*.h' -o -name 
   }')
 
 # Equations are numbered (X.section.n), X the letter of the library, in order; what the code cites is in its MODEL.md.
-numbering=(inertial:I vehicle:V wheel:W slam:S simulation:D camera:K health:H evaluation:E features:T integrity:P)
+numbering=(inertial:I vehicle:V navigation:N wheel:W slam:S simulation:D camera:K health:H evaluation:E features:T integrity:P)
 for entry in "${numbering[@]}"; do
-  library=${entry%:*} letter=${entry#*:} model=lib/${entry%:*}/MODEL.md
-  [[ -f $model ]] || continue
-  # A number at the end of a line defines an equation; anywhere else it cites one.
-  report 'equations are numbered in order, by section' < <(awk -v file="$model" -v letter="$letter" '
-    /^## [0-9]+\./ { section = $2 + 0; last = 0; next }
-    match($0, "\\(" letter "\\.[0-9]+\\.[0-9]+\\)$") && /^    / {
-      split(substr($0, RSTART + 1, RLENGTH - 2), part, ".")
-      if (part[2] != section || part[3] != last + 1) print file ":" FNR ":" $0
-      last = part[3]
-    }' "$model")
+  library=${entry%:*} letter=${entry#*:}
+  [[ -f lib/$library/MODEL.md ]] || continue
+  mapfile -t models < <(find "lib/$library" -name MODEL.md | sort)  # a part of it may lie in a folder of its own, by whole sections
+  for model in "${models[@]}"; do
+    # A number at the end of a line defines an equation; anywhere else it cites one.
+    report 'equations are numbered in order, by section' < <(awk -v file="$model" -v letter="$letter" '
+      /^## [0-9]+\./ { section = $2 + 0; last = 0; next }
+      match($0, "\\(" letter "\\.[0-9]+\\.[0-9]+\\)$") && /^    / {
+        split(substr($0, RSTART + 1, RLENGTH - 2), part, ".")
+        if (part[2] != section || part[3] != last + 1) print file ":" FNR ":" $0
+        last = part[3]
+      }' "$model")
+  done
   report 'a cited equation is in MODEL.md' < <(grep -rnoE --include='*.h' --include='*.cpp' --include='*.md' "\\($letter\\.[0-9]+\\.[0-9]+\\)" \
-    lib/"$library" test/unit/"$library" 2>/dev/null | while IFS=: read -r file number cited; do
-      grep -qE "^    .*\\(${cited:1:-1}\\)\$" "$model" || printf '%s:%s:%s\n' "$file" "$number" "$cited"
+    lib test/unit 2>/dev/null | while IFS=: read -r file number cited; do
+      grep -qE "^    .*\\(${cited:1:-1}\\)\$" "${models[@]}" || printf '%s:%s:%s\n' "$file" "$number" "$cited"
     done)
 done
 
