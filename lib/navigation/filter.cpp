@@ -277,6 +277,31 @@ void Filter::reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vect
   if (at == kGnssVelocityBias) state_.x.gnss_velocity_bias = value;
 }
 
+void Filter::rescale_gnss_bias(int at, double ratio) {
+  flush();
+  const int n = state_.size();
+  const Eigen::Vector3d& value = at == kGnssBias ? state_.x.gnss_bias : state_.x.gnss_velocity_bias;
+  auto d = scratch_.head(n);
+  for (int k = at; k < at + 3; ++k) {
+    const double variance = state_.P()(k, k);
+    if (!(variance > 0.0)) continue;
+    const double root = std::sqrt(std::abs(ratio - 1.0) / variance);
+    d = root * state_.P().col(k).head(n);
+    if (ratio > 1.0) {  // makes unsure and moves nothing: no better mean is found by stretching what a prior has held
+      for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += d(j) * d;
+      continue;
+    }
+    state_.subtract(d);
+    d *= root;
+    for (int j = 0; j < state_.carried().cols(); ++j) {
+      auto step = state_.carried().col(j).head(n);
+      step -= step(k) * d;
+    }
+    d *= -value(k - at);
+    state_.correct(scratch_);
+  }
+}
+
 void Filter::widen(const BaseVector& d) {
   flush();
   state_.P().topLeftCorner<kWithoutCamera, kWithoutCamera>() +=

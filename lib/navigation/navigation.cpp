@@ -352,6 +352,7 @@ void Navigation::mend_steps() {
   const auto step = filter_->mend_step(config_.aiding.gate_sigma, gnss.displaced());
   if (!step) return;
   if (step->kind == StepKind::kWheels) ++steps_;
+  aiding_.forget_way();
   if (step->kind == StepKind::kReceiver) gnss.set_displaced(filter_->state().x.t_us);
   predictor_stale_ = true;
 }

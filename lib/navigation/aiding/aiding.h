@@ -26,6 +26,11 @@ class Aiding {
   [[nodiscard]] const ZeroMotionControl& zero_motion() const { return zero_motion_; }
   [[nodiscard]] const WheelSpeedControl& wheel_speed() const { return wheel_speed_; }
   [[nodiscard]] GnssPositionControl& gnss_position() { return gnss_position_; }
+  /// The filter's way is broken by a step that was taken back: no source compares what came before with what comes.
+  void forget_way() {
+    gnss_position_.forget_way();
+    gnss_velocity_.forget_way();
+  }
   [[nodiscard]] const GnssPositionControl& gnss_position() const { return gnss_position_; }
 
   template <class Archive>

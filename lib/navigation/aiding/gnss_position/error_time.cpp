@@ -10,7 +10,6 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr double kSpacing = 1.0;       // s between two fixes that count
-constexpr double kPriorShare = 0.7;    // B over A, before anything is seen
 constexpr double kPriorWeight = 10.0;  // independent differences that the prior counts for
 constexpr double kMemory = 300.0;      // likewise, of what is seen
 constexpr double kMostSquare = 9.0;    // one difference counts at most as three sigma
@@ -18,9 +17,19 @@ constexpr double kMostSquare = 9.0;    // one difference counts at most as three
 constexpr double kWayShare = 4.0;
 constexpr std::array kTimes = {2.0, 3.0, 4.5, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0};  // s, that are distinguished
 
+constexpr double kLeastShare = 0.02, kMostShare = 0.95;
+constexpr double kShareGain = 0.01;   // per fix, of the correlation of successive innovations
+constexpr double kMostProduct = 4.0;  // of two whitened innovations: outliers count no more
+
 double lag_of(int i) { return static_cast<double>(1 << i); }
 
 }  // namespace
+
+void ErrorTime::see_innovation(const Eigen::Vector2d& whitened) {
+  const double product = std::clamp(0.5 * whitened.dot(whitened_), -kMostProduct, kMostProduct);
+  share_ = std::clamp(share_ + kShareGain * product, kLeastShare, kMostShare);
+  whitened_ = whitened;
+}
 
 ErrorTime::ErrorTime() {
   for (int i = 0; i < kLags; ++i) structure_(i) = 1.0 - kPriorShare * std::exp(-lag_of(i) / kPrior);

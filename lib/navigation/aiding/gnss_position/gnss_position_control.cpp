@@ -11,13 +11,12 @@ namespace {
 
 constexpr double kOutage = 3.0;    // s without a position, after which its errors are new
 constexpr double kForEver = 1e12;  // s
-constexpr double kErrorTime =
-    20.0;  // s: multipath and code smoothing last seconds to a minute (Misra and Enge 2006, ch. 5)
-// Share of a fix's variance that lasts, before innovations have shown it, and its bounds.
-constexpr double kCodeShare = 0.7, kPhaseShare = 0.05;
-constexpr double kLeastShare = 0.02, kMostShare = 0.95;
-constexpr double kShareGain = 0.01;   // per fix, of the correlation of successive innovations (Mehra 1970)
-constexpr double kMostProduct = 4.0;  // of two whitened innovations: outliers count no more
+// Of a fixed carrier phase: half a wavelength's error of the path lasts, and no way is known well enough to show it.
+constexpr LastingError kPhase = {0.05, 1.0 / 20.0};
+// The velocity of a filter that is aided is off by the same for about so long: what the driven way drifts by is a random
+// walk of twice its variance times this, and no less than a centimetre.
+constexpr double kVelocityTime = 1.0;  // s
+constexpr double kLeastDrift = 0.01;   // m/sqrt(s)
 // m: how far off a receiver without a fixed phase may come back from an outage, level and up; how far off a displaced one
 // typically is.
 constexpr double kReturnLevel = 3.0, kReturnUp = 6.0;
@@ -38,19 +37,29 @@ double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
   return -0.5 * std::log(cov.determinant()) - 0.5 * (kTailFreedom + 2.0) * std::log1p(m / kTailFreedom);
 }
 
+/// Level, m: a fix less the antenna, with the receiver's error in it.
+Eigen::Vector2d off_way(const Filter& filter, const Queued& fix) {
+  const State& s = filter.state();
+  const Measurement<3> m = gnss_position(s, filter.motion(), fix.value, fix.cov, fix.ahead(s.x));
+  return (m.residual + s.x.gnss_bias).head<2>();
+}
+
 Eigen::Vector3d return_variance() { return Eigen::Vector3d(kReturnLevel, kReturnLevel, kReturnUp).cwiseAbs2(); }
 
 }  // namespace
 
 GnssPositionControl::GnssPositionControl(const NavigationConfig& config)
-    : config_(config), gates_(config.aiding.gate_sigma), open_(Gates::open()) {
-  for (Receiver& r : receivers_) r.lasting_share = config.aiding.lasting_errors ? kCodeShare : 0.0;
-  if (config.aiding.lasting_errors) receivers_[static_cast<size_t>(FixType::kRtkFixed)].lasting_share = kPhaseShare;
+    : config_(config), gates_(config.aiding.gate_sigma), open_(Gates::open()) {}
+
+LastingError GnssPositionControl::lasting(FixType type) const {
+  if (!config_.aiding.lasting_errors) return {};
+  if (heavy_tailed(type)) return {error_time_.share(), 1.0 / error_time_.time()};
+  return type == FixType::kRtkFixed ? kPhase : receiver(type).lasting.mean();
 }
 
 Eigen::Vector3d GnssPositionControl::lasting_std(const GnssFix& fix) const {
   const Receiver& r = receiver(fix.fix_type);
-  Eigen::Vector3d variance = r.lasting_share * r.scale.variance_factor() * fix.cov_enu.diagonal();
+  Eigen::Vector3d variance = lasting(fix.fix_type).share * r.scale.variance_factor() * fix.cov_enu.diagonal();
   if (returns(fix.t_us, fix.fix_type)) variance += return_variance();
   return variance.cwiseSqrt();
 }
@@ -64,7 +73,8 @@ bool GnssPositionControl::returns(int64_t t_us, FixType type) const {
 GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const {
   const Receiver& r = receiver(fix.fix_type);
   Bias bias;
-  bias.stationary_std = (r.lasting_share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
+  bias.like = lasting(fix.fix_type);
+  bias.stationary_std = (bias.like.share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
   bias.std = bias.stationary_std;
   const bool after_outage = tried_at_us_ != 0 && seconds_between(tried_at_us_, fix.t_us) > kOutage;
   bias.anew = tried_at_us_ == 0 || after_outage || fix.fix_type != last_type_;
@@ -75,7 +85,7 @@ GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const 
 /// Where b begins anew it is part of the noise, so that a rejected fix leaves the filter as it was.
 Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queued& fix, const Bias& bias) const {
   const Receiver& r = receiver(fix.fix_type);
-  const double white = (1.0 - r.lasting_share) * r.scale.variance_factor();
+  const double white = (1.0 - bias.like.share) * r.scale.variance_factor();
   Measurement<3> m =
       gnss_position(filter.state(), filter.motion(), fix.value, white * fix.cov, fix.ahead(filter.state().x));
   if (!bias.anew) return m;
@@ -85,19 +95,30 @@ Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queu
   return m;
 }
 
-void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) const {
+/// How b moves from now on.
+void GnssPositionControl::set_noise(Filter& filter, const Bias& bias) const {
   filter.gnss_bias().position_std = bias.stationary_std;
   for (int i = 0; i < 3; ++i) {
     const bool off = displaced() || (i == 2 && height_displaced_);
-    filter.gnss_bias().position_time(i) = off ? kForEver : kErrorTime;
+    filter.gnss_bias().position_time(i) = off ? kForEver : 1.0 / bias.like.rate;
     filter.gnss_bias().position_walk(i) = off ? kDisplacedWalk : 0.0;
   }
-  if (bias.anew) filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
+}
+
+/// Where b's share turns out to be another, what of the fixes went to the place and what to b was wrong from the start.
+void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
+  set_noise(filter, bias);
+  if (bias.anew) {
+    filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
+  } else if (config_.facts.has_imu && share_ > 0.0 && bias.like.share != share_ && !displaced()) {
+    filter.rescale_gnss_bias(kGnssBias, bias.like.share / share_);
+  }
+  share_ = bias.like.share;
 }
 
 AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) const {
   Bias bias = bias_of(fix);
-  set_bias(filter, bias);
+  set_noise(filter, bias);
   bias.anew = false;
   return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
@@ -120,7 +141,7 @@ AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued&
   if (config_.aiding.lasting_errors)
     error_time_.add(fix.t_us, fix.value.head<2>() - way_, variance.cwiseSqrt(), way_std_);
   set_bias(filter, bias);
-  filter.gnss_bias().position_time.head<2>().setConstant(error_time_.time());
+  filter.gnss_bias().position_time.z() = ErrorTime::kPrior;  // nothing drives up and down that would show it
   for (int i = 0; i < 3 && wider > 1.0; ++i) {
     BaseVector d = BaseVector::Zero();
     d(kGnssBias + i) = std::sqrt(wider - 1.0) * bias.stationary_std(i);
@@ -135,8 +156,10 @@ AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued&
   last_spread_ = filter.state().P().block<2, 2>(kPos, kPos).trace();
   r.nis /= wider;
   learn(fix, r);
-  tried(fix);
-  used_at_us_ = fix.t_us;
+  if (config_.aiding.lasting_errors)
+    error_time_.see_innovation(
+        {r.innovation[0] / std::sqrt(r.innovation_variance[0]), r.innovation[1] / std::sqrt(r.innovation_variance[1])});
+  note(fix);
   return r;
 }
 
@@ -145,6 +168,7 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   if (heavy_tailed(fix.fix_type)) return use_heavy_tailed(filter, fix, bias);
   last_place_.reset();
   error_time_.clear();
+  const Eigen::Vector2d before = off_way(filter, fix);
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
   if (displaced() && r.status != AidingStatus::kBadInput) {
     if (is_back(filter, fix, bias, r.log_likelihood)) {
@@ -165,9 +189,10 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
     const AidingRecord level = use_level(filter, fix, bias);
     r = level.status == AidingStatus::kAccepted ? level : decide(filter, fix, bias, r);
   }
+  if (r.status == AidingStatus::kAccepted) watch(filter, fix, bias_of(fix), before);
+  if (r.status == AidingStatus::kReset) forget_way();
   if (r.status == AidingStatus::kAccepted || r.status == AidingStatus::kReset) {
-    tried(fix);
-    used_at_us_ = fix.t_us;
+    note(fix);
     rejected_ = 0;
   }
   return r;
@@ -206,16 +231,27 @@ AidingRecord GnssPositionControl::believe(Filter& filter, const Queued& fix, con
   return r;
 }
 
-/// (N.5.3), (N.5.4): scale by the size of innovations, share of what lasts by their correlation.
+/// (N.5.3)
 void GnssPositionControl::learn(const Queued& fix, const AidingRecord& r) {
-  Receiver& seen = receivers_[static_cast<size_t>(fix.fix_type)];
-  seen.scale.learn(r);
-  if (!config_.aiding.lasting_errors) return;
-  const Eigen::Vector2d whitened(r.innovation[0] / std::sqrt(r.innovation_variance[0]),
-                                 r.innovation[1] / std::sqrt(r.innovation_variance[1]));
-  const double product = std::clamp(0.5 * whitened.dot(seen.last_whitened), -kMostProduct, kMostProduct);
-  seen.lasting_share = std::clamp(seen.lasting_share + kShareGain * product, kLeastShare, kMostShare);
-  seen.last_whitened = whitened;
+  receivers_[static_cast<size_t>(fix.fix_type)].scale.learn(r);
+}
+
+/// A used fix shows what of its kind's errors lasts, (N.5.4), unless what it has brought back from an outage is still there.
+void GnssPositionControl::watch(const Filter& filter, const Queued& fix, const Bias& bias,
+                                const Eigen::Vector2d& before) {
+  if (returns(fix.t_us, fix.fix_type)) returned_at_us_ = fix.t_us;
+  LastingErrorModels& models = receivers_[static_cast<size_t>(fix.fix_type)].lasting;
+  if (bias.anew) models.begin_anew();
+  if (!config_.aiding.lasting_errors || displaced() || returning(fix, bias.like)) return models.begin_anew();
+  const Eigen::Array2d velocity = filter.state().P().diagonal().segment<2>(kVel);
+  models.add({fix.t_us, before, off_way(filter, fix), fix.cov.diagonal().head<2>(),
+              2.0 * kVelocityTime * velocity + kLeastDrift * kLeastDrift});
+}
+
+bool GnssPositionControl::returning(const Queued& fix, const LastingError& like) const {
+  if (returned_at_us_ == 0) return false;
+  const double left = kReturnLevel * std::exp(-like.rate * seconds_between(returned_at_us_, fix.t_us));
+  return left * left > fix.cov(0, 0);
 }
 
 /// The height alone contradicts: it becomes an error of the receiver's height, which fades as its errors do.

@@ -1,7 +1,7 @@
 /// When and with what noise a GNSS position is used: the one error model of a receiver, (N.5) of MODEL.md.
 ///
-/// A position is h + b + n: n white with an adaptive scale, b a Gauss-Markov state whose share of the variance follows
-/// from the whiteness of innovations. What the gate rejects is a single outlier, a displaced receiver or a wrong filter:
+/// A position is h + b + n: n white with an adaptive scale, b a Gauss-Markov state whose share of the variance and time
+/// are those that explain the fixes best against the way driven. What the gate rejects is a single outlier, a displaced receiver or a wrong filter:
 /// runs of rejected fixes that agree with each other are decided by the likelihoods of the last two under heavy-tailed
 /// priors, and b or the filter is widened by what they differ.
 #pragma once
@@ -10,6 +10,7 @@
 
 #include "navigation/aiding/gates.h"
 #include "navigation/aiding/gnss_position/error_time.h"
+#include "navigation/aiding/gnss_position/lasting_error.h"
 #include "navigation/aiding/noise_scale.h"
 #include "navigation/measurement_queue.h"
 #include "navigation/serialise_optional.h"
@@ -26,8 +27,8 @@ class GnssPositionControl {
   AidingRecord try_on(Filter& filter, const Queued& fix) const;
   /// A fix was tried on the hypotheses of a start.
   void tried(const Queued& fix) {
-    tried_at_us_ = used_at_us_ = fix.t_us;
-    last_type_ = fix.fix_type;
+    note(fix);
+    share_ = lasting(fix.fix_type).share;
   }
   /// m, of the Gauss-Markov error in a fix, level axes.
   [[nodiscard]] Eigen::Vector3d lasting_std(const GnssFix& fix) const;
@@ -41,10 +42,17 @@ class GnssPositionControl {
   /// The height alone is displaced.
   [[nodiscard]] bool height_displaced() const { return height_displaced_; }
   /// The filter has a gap in its past: nothing holds against the receiver.
-  void clear_run() { rejected_ = 0; }
+  void clear_run() {
+    rejected_ = 0;
+    forget_way();
+  }
+  /// The way driven is broken (a gap, a step that was taken back): older fixes are not compared with newer ones.
+  void forget_way() {
+    for (Receiver& r : receivers_) r.lasting.begin_anew();
+  }
   /// The filter starts anew: what contradicted the receiver is gone.
   void restart() {
-    rejected_ = 0;
+    clear_run();
     displaced_since_us_ = 0;
     height_displaced_ = false;
   }
@@ -53,10 +61,10 @@ class GnssPositionControl {
   void serialise(Archive& a) {
     for (Receiver& r : receivers_) {
       r.scale.serialise(a);
-      a(r.lasting_share, r.last_whitened);
+      r.lasting.serialise(a);
     }
-    a(used_at_us_, tried_at_us_, last_type_, rejected_, rejected_since_us_, displaced_since_us_, back_, first_off_,
-      height_displaced_, way_, way_std_, last_spread_);
+    a(used_at_us_, tried_at_us_, returned_at_us_, last_type_, share_, rejected_, rejected_since_us_,
+      displaced_since_us_, back_, first_off_, height_displaced_, way_, way_std_, last_spread_);
     error_time_.serialise(a);
     serialise_optional(
         a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
@@ -66,20 +74,28 @@ class GnssPositionControl {
   /// What fixes of one type have shown.
   struct Receiver {
     NoiseScale scale;
-    double lasting_share = 0.0;
-    Eigen::Vector2d last_whitened = Eigen::Vector2d::Zero();
+    LastingErrorModels lasting{{5.0, 15.0, 50.0}};  // s: multipath and code smoothing (Misra and Enge 2006, ch. 5)
   };
   /// What of the receiver's Gauss-Markov error a fix begins with.
   struct Bias {
+    LastingError like;
     bool anew = false;  ///< another type, or a return from an outage: what b holds is over
     Eigen::Vector3d stationary_std, std;
   };
 
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
+  void note(const Queued& fix) {
+    tried_at_us_ = used_at_us_ = fix.t_us;
+    last_type_ = fix.fix_type;
+  }
   [[nodiscard]] bool returns(int64_t t_us, FixType type) const;
+  [[nodiscard]] bool returning(const Queued& fix, const LastingError& like) const;
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
-  void set_bias(Filter& filter, const Bias& bias) const;
+  [[nodiscard]] LastingError lasting(FixType type) const;
+  void set_noise(Filter& filter, const Bias& bias) const;
+  void set_bias(Filter& filter, const Bias& bias);
+  void watch(const Filter& filter, const Queued& fix, const Bias& bias, const Eigen::Vector2d& before);
   /// A code receiver without an imu beside it: nothing but other fixes could show an outlier.
   [[nodiscard]] bool heavy_tailed(FixType type) const {
     return !config_.facts.has_imu && type != FixType::kRtkFixed && type != FixType::kRtkFloat;
@@ -95,9 +111,10 @@ class GnssPositionControl {
   NavigationConfig config_;
   Gates gates_, open_;
   std::array<Receiver, 6> receivers_;  // by FixType
-  int64_t used_at_us_ = 0, tried_at_us_ = 0;
+  int64_t used_at_us_ = 0, tried_at_us_ = 0, returned_at_us_ = 0;
   FixType last_type_ = FixType::kNone;
-  int rejected_ = 0;  // in a row, that agree with each other
+  double share_ = 0.0;  // of the variance, that b has been taken to have
+  int rejected_ = 0;    // in a row, that agree with each other
   int64_t rejected_since_us_ = 0, displaced_since_us_ = 0;
   double back_ = 0.0;                                    // logarithm of the odds that it is no longer displaced
   Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();  // innovation of the first of them

@@ -1,39 +1,78 @@
 #include "navigation/aiding/gnss_velocity/gnss_velocity_control.h"
 
+#include "geometry/so3.h"
 #include "navigation/aiding/gnss_velocity/gnss_velocity_model.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kLastingShare = 0.5;  // of the claimed variance, in the Gauss-Markov state
-constexpr double kSmoothing = 0.1;     // s, of a receiver's low-pass filter: its error grows with the acceleration
-constexpr double kErrorTime = 2.0;     // s
-constexpr int kPersistent = 8;         // rejected in a row: more than a cluster of bad ones
+constexpr LastingError kWithoutImu = {0.5, 0.5};  // nothing propagates a velocity well enough to show it
+constexpr double kSmoothing = 0.1;    // s, of a receiver's low-pass filter: its error grows with the acceleration
+constexpr int kPersistent = 8;        // rejected in a row: more than a cluster of bad ones
+constexpr double kOutage = 3.0;       // s without a velocity, over which nothing is compared
+constexpr double kTiltTime = 10.0;    // s, for which tilt and biases of an aided filter are off by the same
+constexpr double kLeastDrift = 0.01;  // m/s/sqrt(s), of a velocity that the imu carries
+
+/// m2/s3, level: by how much the propagated velocity may drift, as a random walk.
+Eigen::Vector2d drift_rate(Filter& filter) {
+  const State& s = filter.state();
+  const Eigen::Vector3d force = filter.motion().acceleration - filter.earth().gravity(s.x.nav.position);
+  Eigen::Matrix<double, 2, 6> H;  // of the acceleration by attitude and accelerometer bias
+  H << -skew(force).topRows<2>(), -s.x.R().topRows<2>();
+  Eigen::Matrix<double, 6, 6> P;
+  P << s.P().block<3, 3>(kAtt, kAtt), s.P().block<3, 3>(kAtt, kAccelBias), s.P().block<3, 3>(kAccelBias, kAtt),
+      s.P().block<3, 3>(kAccelBias, kAccelBias);
+  return (2.0 * kTiltTime * (H * P * H.transpose()).diagonal().array() + kLeastDrift * kLeastDrift).matrix();
+}
+
+/// m/s, level: a velocity less the filter's, with the receiver's error in it.
+Eigen::Vector2d off_way(const Filter& filter, const Queued& v) {
+  const State& s = filter.state();
+  return (gnss_velocity(s, filter.motion(), v.value, v.cov, v.ahead(s.x)).residual + s.x.gnss_velocity_bias).head<2>();
+}
 
 }  // namespace
 
+LastingError GnssVelocityControl::lasting() const {
+  if (!lasting_) return {};
+  return has_imu_ ? models_.mean() : kWithoutImu;
+}
+
 AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, double gate) const {
-  const double share = lasting_ ? kLastingShare : 0.0, factor = scale_.variance_factor();
+  const LastingError like = lasting();
+  const double factor = scale_.variance_factor();
   const Eigen::Vector3d lag = kSmoothing * filter.motion().acceleration;
   Measurement<3> m = gnss_velocity(filter.state(), filter.motion(), velocity.value,
-                                   factor * (1.0 - share) * velocity.cov, velocity.ahead(filter.state().x));
+                                   factor * (1.0 - like.share) * velocity.cov, velocity.ahead(filter.state().x));
   // A smoothed velocity looks like an antenna elsewhere: the antenna's place is noise here, and not estimated.
   const Eigen::Matrix3d by_antenna = m.H.middleCols<3>(kAntenna);
   m.R += by_antenna * filter.state().P().block<3, 3>(kAntenna, kAntenna) * by_antenna.transpose();
   m.H.middleCols<3>(kAntenna).setZero();
   const AidingRecord r = filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
   if (r.status != AidingStatus::kAccepted || !lasting_) return r;
-  filter.gnss_bias().velocity_time = kErrorTime;
-  filter.gnss_bias().velocity_std = (factor * (share * velocity.cov.diagonal() + lag.cwiseAbs2())).cwiseSqrt();
+  filter.gnss_bias().velocity_time = 1.0 / like.rate;
+  filter.gnss_bias().velocity_std = (factor * (like.share * velocity.cov.diagonal() + lag.cwiseAbs2())).cwiseSqrt();
   return r;
 }
 
 AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {
+  const Eigen::Vector2d before = off_way(filter, velocity);
   const AidingRecord r = fuse(filter, velocity, gates_.nis[3]);
   rejected_ = r.status == AidingStatus::kGated ? rejected_ + 1 : 0;
   if (r.status == AidingStatus::kAccepted || rejected_ >= kPersistent) scale_.learn(r);
+  if (r.status == AidingStatus::kAccepted && lasting_ && has_imu_) watch(filter, velocity, before);
   return r;
+}
+
+/// A used velocity shows what of the receiver's errors lasts, (N.5.4).
+void GnssVelocityControl::watch(Filter& filter, const Queued& velocity, const Eigen::Vector2d& before) {
+  if (seconds_between(last_us_, velocity.t_us) > kOutage) models_.begin_anew();
+  last_us_ = velocity.t_us;
+  const double share = models_.mean().share;
+  models_.add(
+      {velocity.t_us, before, off_way(filter, velocity), velocity.cov.diagonal().head<2>(), drift_rate(filter)});
+  filter.rescale_gnss_bias(kGnssVelocityBias, models_.mean().share / share);
 }
 
 AidingRecord GnssVelocityControl::try_on(Filter& filter, const Queued& velocity) const {
