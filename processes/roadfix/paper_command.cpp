@@ -120,6 +120,11 @@ void add_paper_c(CLI::App& paper) {
       paper, "c", "Lee et al. (2025): tables 1 and 2, the fusion as printed, each part left out, and the default",
       experiment, options);
   command->add_flag("--again", options->drive.again, "Run the estimators although the drive has their poses");
+  command
+      ->add_option("--remove-slow-s", options->drive.slow_window,
+                   "s: shows vision also as the paper scored it, without what of its error is slower (0: not)")
+      ->check(CLI::Range(0.0, 1e5))
+      ->capture_default_str();
   add_turn_rate(*command, *options, "yaw rate that counts as a turn (MPA)");
 }
 

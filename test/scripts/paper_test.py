@@ -94,6 +94,12 @@ class Paper(unittest.TestCase):
         self.assertEqual(transitions["literal"][0], "")
         self.assertEqual(transitions["literal, one model"][3], "")
         self.assertNotEqual(accuracy["fusion, literal"], accuracy["fusion, literal, fixed R"])
+        slowless = self.folder / "slowless"
+        done = roadfix("paper", "c", self.drive, "--config", VEHICLE, "--out", slowless, "--remove-slow-s", "5")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = rows_of(slowless / "table_1.csv")
+        self.assertLess(float(rows.pop("VIO, similarity, slower than 5 s removed")[0]), float(rows["VIO, similarity"][0]))
+        self.assertEqual(rows, accuracy)
         # Of poses that are recorded the same tables come out.
         poses = self.folder / "poses.lcm"
         stages = "gnss_ins_ekf,vo_tracker,wheel_odometry"
