@@ -48,9 +48,10 @@ enum class StreetKind {
   kBridge,  ///< under a wide bridge: pillars on both sides, a deck 6 m above
   kTunnelLit,
   kTunnelDark,
-  kCorridor,  ///< bare walls 3 m apart, a ceiling
-  kHighway,   ///< three lanes, guard rails, gantries
-  kCarPark,   ///< a wide floor with bays and parked cars
+  kCorridor,           ///< bare walls 3 m apart, a ceiling
+  kFurnishedCorridor,  ///< the same of bricks, with doors and notice boards
+  kHighway,            ///< three lanes, guard rails, gantries
+  kCarPark,            ///< a wide floor with bays and parked cars
 };
 
 /// Where the vehicle is from begin_s on, up to the next one's begin.
@@ -58,6 +59,11 @@ struct SceneSegment {
   double begin_s = 0.0;
   StreetKind kind = StreetKind::kStreet;
 };
+
+/// Closed all round: no sky, no ground beyond, no traffic.
+inline bool is_corridor(StreetKind kind) {
+  return kind == StreetKind::kCorridor || kind == StreetKind::kFurnishedCorridor;
+}
 
 struct SceneConfig {
   std::vector<SceneSegment> segments = {{}};  ///< ascending, the first at 0
@@ -116,6 +122,7 @@ void visit(SceneSegment& s, Visitor& v) {
             {"tunnel_lit", StreetKind::kTunnelLit},
             {"tunnel_dark", StreetKind::kTunnelDark},
             {"corridor", StreetKind::kCorridor},
+            {"furnished_corridor", StreetKind::kFurnishedCorridor},
             {"highway", StreetKind::kHighway},
             {"car_park", StreetKind::kCarPark}});
 }

@@ -88,6 +88,18 @@ Points corridor(double duration_s) {
   return points;
 }
 
+/// A figure of eight of two squares that have a side in common.
+Points right_angles(double duration_s) {
+  const Points lap = {{15, 0, 6, 2, 0, false},    {15, 15, 6, 2, 2, false}, {-15, 15, 6, 2, 0, false},
+                      {-15, 0, 6, 2, 0, false},   {15, 0, 6, 2, 2, false},  {15, -15, 6, 2, 0, false},
+                      {-15, -15, 6, 2, 0, false}, {-15, 0, 6, 2, 0, false}};
+  Points points = {{-25, 0, 6, 2, 3, false}};
+  const int laps = 1 + static_cast<int>(duration_s / 90.0);
+  for (int i = 0; i < laps; ++i) points.insert(points.end(), lap.begin(), lap.end());
+  points.push_back({25, 0, 6, 2, 0, false});
+  return points;
+}
+
 }  // namespace
 
 std::vector<WayPoint> way_points(RouteKind route, double duration_s) {
@@ -108,6 +120,8 @@ std::vector<WayPoint> way_points(RouteKind route, double duration_s) {
       return long_city(duration_s);
     case RouteKind::kCorridor:
       return corridor(duration_s);
+    case RouteKind::kRightAngles:
+      return right_angles(duration_s);
     case RouteKind::kTurn:
       return {{0, 0, 0, 13.9, 3, false}, {890, 0, 40, 13.9, 0, false}, {890, 1000, 0, 13.9, 0, false}};
   }

@@ -23,6 +23,7 @@ enum class RouteKind {
   kLongCity,         ///< half an hour of city streets with stops
   kTunnel,           ///< main road for the tunnel scenarios
   kCorridor,         ///< indoors at walking pace, tight corners
+  kRightAngles,      ///< corners of 90 deg, four to the left and four to the right, at walking pace
   kTurn,             ///< a minute straight on at constant speed, then a right angle
 };
 
@@ -136,6 +137,7 @@ void visit(MotionConfig& c, Visitor& v) {
             {"long_city", RouteKind::kLongCity},
             {"tunnel", RouteKind::kTunnel},
             {"corridor", RouteKind::kCorridor},
+            {"right_angles", RouteKind::kRightAngles},
             {"turn", RouteKind::kTurn}});
   v.number("speed_factor", c.speed_factor, 0.05, 3.0);
   v.number("acceleration_mps2", c.acceleration_mps2, 0.1, 10.0);

@@ -28,7 +28,18 @@ void add_faults(ScenarioConfig& c, std::initializer_list<const char*> texts) {
   for (const char* text : texts) c.faults.push_back(parse_fault(text));
 }
 
+constexpr double kThirdCorner_s = 62.0;  // on the corridor's route
+
 void set_scene(ScenarioConfig& c, std::vector<SceneSegment> segments) { c.scene.segments = std::move(segments); }
+
+/// Walking pace on an even floor, no receiver.
+void set_indoors(ScenarioConfig& c) {
+  c.motion.acceleration_mps2 = c.motion.braking_mps2 = 0.6;
+  c.motion.lateral_mps2 = 0.8;
+  c.motion.hill_factor = 0.0;
+  c.motion.road_roughness_m3 = kGoodRoad;
+  c.gnss.rate_hz = 0.0;
+}
 
 /// The course of Lee et al. (2025): a minute of open sky, half a minute of bad fixes under a bridge, a minute of tunnel, and
 /// fixes that are off when they come back.
@@ -122,16 +133,20 @@ const std::vector<Scenario>& scenarios() {
          c.motion.route = RouteKind::kTurn;
          c.duration_s = 90.0;
        }},
-      {"corridor", "indoors at walking pace, without GNSS",
+      {"right_angles", "corners of 90 degrees to both sides at walking pace, without GNSS",
+       [](ScenarioConfig& c) {
+         c.motion.route = RouteKind::kRightAngles;
+         set_indoors(c);
+         c.duration_s = 150.0;
+         set_scene(c, {{0.0, StreetKind::kCarPark}});
+       }},
+      {"corridor", "indoors at walking pace, without GNSS; bare walls from the third corner on",
        [](ScenarioConfig& c) {
          c.motion.route = RouteKind::kCorridor;
-         c.motion.acceleration_mps2 = c.motion.braking_mps2 = 0.6;
-         c.motion.lateral_mps2 = 0.8;
-         c.motion.hill_factor = 0.0;
-         c.motion.road_roughness_m3 = kGoodRoad;
-         c.gnss.rate_hz = 0.0;
+         set_indoors(c);
          c.duration_s = 150.0;
-         set_scene(c, {{0.0, StreetKind::kCorridor}});
+         // The course of Ock et al. (2020): vision holds up to the third corner and has nothing to see there.
+         set_scene(c, {{0.0, StreetKind::kFurnishedCorridor}, {kThirdCorner_s, StreetKind::kCorridor}});
        }},
   };
   return all;

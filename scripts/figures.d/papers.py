@@ -37,10 +37,11 @@ def number(row, column):
 
 
 def b_dark_m(runs):
-    """City at walking to driving speed, darkness of 8 s from 30 s on: POSE_LOCAL's horizontal error 20 s after the light, tied where all have their first pose."""
+    """Their setting, walking pace among things to see (right_angles), darkness of 8 s from 30 s on, while it moves: POSE_LOCAL's horizontal error 20 s after
+    the light, tied where all have their first pose. No receiver shows the wheels' scale, known to 1 %: over 450 m of a city it alone makes 4 m."""
     at = DARK_FROM_S + DARK_S + AFTER_S
     words = ("--duration", at + 3, "--fault", f"camera.dark@{DARK_FROM_S}+{DARK_S}")
-    return max(number(table(experiment(runs, "city_loop", seed, *words) / "errors_by_time.csv").get(str(at)), f"{LOCAL} m") for seed in SEEDS)
+    return max(number(table(experiment(runs, "right_angles", seed, *words) / "errors_by_time.csv").get(str(at)), f"{LOCAL} m") for seed in SEEDS)
 
 
 def b_corridor_ratio(runs):

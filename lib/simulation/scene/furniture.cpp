@@ -210,7 +210,7 @@ void build_movers(WorldBuilder& b) {
   const auto lane = [&](double t, bool backwards) {
     MovingObject m;
     for (const Station& s : b.line.stations()) {
-      const bool road = s.kind != StreetKind::kCorridor && s.kind != StreetKind::kCarPark;
+      const bool road = !is_corridor(s.kind) && s.kind != StreetKind::kCarPark;
       if (!road) continue;
       m.lane.push_back(s.at(t, 0.01));
       m.lane_light.push_back(b.light(s, m.lane.back() + Eigen::Vector3d(0, 0, 1), Eigen::Vector3d::UnitZ()) / 0.30F);

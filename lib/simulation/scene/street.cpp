@@ -58,6 +58,7 @@ float WorldBuilder::light(const Station& at, const Eigen::Vector3d& p, const Eig
     case StreetKind::kTunnelDark:
       return static_cast<float>(sky * open * std::sqrt(open));
     case StreetKind::kCorridor:
+    case StreetKind::kFurnishedCorridor:
       return static_cast<float>(kCorridorLight * (0.85 + 0.15 * n.z()));
     default:
       return static_cast<float>(sky);
@@ -184,7 +185,7 @@ void build_roads(WorldBuilder& b) {
   // The country around, in stretches of slightly different height, so that where they overlap one is on top.
   int layer = 0;
   for_stretches(
-      b.line, [](const Station& s) { return s.kind != StreetKind::kCorridor && s.kind != StreetKind::kCarPark; },
+      b.line, [](const Station& s) { return !is_corridor(s.kind) && s.kind != StreetKind::kCarPark; },
       [&](int i, int j) {
         for (int k = i; k < j; k += 64, layer = (layer + 1) % 8) {
           const double z = -0.12 - 0.02 * layer;

@@ -56,7 +56,7 @@ void set_kind(const std::vector<StreetSegment>& segments, Station& station) {
 /// Whether `here` lies on the street of the earlier station.
 bool same_place(const Station& earlier, const Station& here) {
   const Eigen::Vector2d d = (here.p - earlier.p).head<2>();
-  const double radius = here.kind == StreetKind::kCorridor ? kSameIndoors_m : kSamePlace_m;
+  const double radius = is_corridor(here.kind) ? kSameIndoors_m : kSamePlace_m;
   return d.norm() < radius && std::abs(d.dot(earlier.forward.head<2>())) < kBeside_m;
 }
 
@@ -81,8 +81,8 @@ StreetLine::StreetLine(const StreetPlan& plan) {
   const Eigen::Vector3d out = level_direction(points[reach] - start);
   const Eigen::Vector3d on = level_direction(end - points[points.size() - 1 - reach]);
   std::vector<Eigen::Vector3d> all;
-  const double before_m = plan.segments.front().kind == StreetKind::kCorridor ? kBeforeIndoors_m : kBefore_m;
-  const double after_m = plan.segments.back().kind == StreetKind::kCorridor ? kAfterIndoors_m : kAfter_m;
+  const double before_m = is_corridor(plan.segments.front().kind) ? kBeforeIndoors_m : kBefore_m;
+  const double after_m = is_corridor(plan.segments.back().kind) ? kAfterIndoors_m : kAfter_m;
   for (double d = before_m; d >= 1.0; d -= 1.0) all.emplace_back(start - d * out);
   all.insert(all.end(), points.begin(), points.end());
   for (double d = 1.0; d <= after_m; d += 1.0) all.emplace_back(end + d * on);
@@ -103,7 +103,7 @@ StreetLine::StreetLine(const StreetPlan& plan) {
   find_repeats();
   // A corridor that ends in itself gets no arm through its own wall.
   const int last = n - 1 - static_cast<int>(after_m);
-  if ((*this)[last].kind != StreetKind::kCorridor || !(*this)[last].again) return;
+  if (!is_corridor((*this)[last].kind) || !(*this)[last].again) return;
   for (int i = last; i < n; ++i) stations_[static_cast<std::size_t>(i)].again = true;
 }
 

@@ -94,8 +94,7 @@ void build_bridge(WorldBuilder& b, int i, int j) {
 }
 
 /// One wall of a corridor, open where the path comes through from another one.
-void build_corridor_wall(WorldBuilder& b, int i, int j, double t) {
-  const Appearance wall{Material::kBlankWall};
+void build_corridor_wall(WorldBuilder& b, int i, int j, double t, const Appearance& wall) {
   const auto open_at = [&](int k) { return b.line.passes_elsewhere(b.line[k].at(t, 0.0), kDoorway, k); };
   for (int k = i; k < j;) {
     int end = k;
@@ -115,17 +114,45 @@ void build_corridor_wall(WorldBuilder& b, int i, int j, double t) {
   }
 }
 
+Appearance wall_of(StreetKind corridor) {
+  if (corridor == StreetKind::kFurnishedCorridor) return {Material::kBrick, Pattern::kCourses, 1.0F, 0.5F, 0.25F};
+  return {Material::kBlankWall};
+}
+
+/// Notice boards on both walls, on straight stretches.
+void hang_boards(WorldBuilder& b, int i, int j) {
+  for (int k = i; k < j; k += 2) {
+    const Station& at = b.line[k];
+    if (std::abs(at.curvature) > 0.05) continue;
+    PlaceRandom random = b.random(at.p, "boards");
+    for (const double t : {-kHalfCorridor + 0.02, kHalfCorridor - 0.02}) {
+      const auto size = static_cast<float>(random.uniform(0.5, 1.1));
+      const Eigen::Vector3d corner = at.at(t, random.uniform(0.7, 1.5)) + random.uniform(-0.4, 0.4) * at.forward;
+      if (b.line.passes_elsewhere(corner, kDoorway + size, k)) continue;
+      b.rectangle(at, corner, size * at.forward, Eigen::Vector3d(0, 0, size),
+                  {Material::kMetal, Pattern::kSign, 1.0F, size, size});
+    }
+  }
+}
+
 /// `depth`: this stretch's floor and ceiling lie so much outside of those of the stretches before, which they may meet.
 void build_corridor(WorldBuilder& b, int i, int j, double depth) {
   b.ribbon(i, j, 4, {-kFloorEdge, -depth}, {kFloorEdge, -depth},
            {Material::kBlankWall, Pattern::kCourses, 0.6F, 1.0F, 1.0F});
   b.ribbon(i, j, 4, {-kFloorEdge, kCorridorHeight + depth}, {kFloorEdge, kCorridorHeight + depth},
            {Material::kBlankWall, Pattern::kNone, 1.2F});
-  for (const double t : {-kHalfCorridor, kHalfCorridor}) build_corridor_wall(b, i, j, t);
+  for (int k = i; k < j;) {  // up to the next kind's first station, so that no gap is between them
+    const StreetKind kind = b.line[k].kind;
+    int end = k + 1;
+    while (end < j && b.line[end].kind == kind) ++end;
+    for (const double t : {-kHalfCorridor, kHalfCorridor}) build_corridor_wall(b, k, end, t, wall_of(kind));
+    if (kind == StreetKind::kFurnishedCorridor) hang_boards(b, k, end);
+    k = end;
+  }
   for (const int end : {i, j}) {
     if ((end != 0 && end != b.line.size() - 1) || b.line[end].again) continue;
     b.rectangle(b.line[end], b.line[end].at(-kHalfCorridor, 0.0), 2.0 * kHalfCorridor * b.line[end].left,
-                Eigen::Vector3d(0, 0, kCorridorHeight), {Material::kBlankWall});
+                Eigen::Vector3d(0, 0, kCorridorHeight), wall_of(b.line[end].kind));
   }
   for (int k = i; k < j; k += 9) {
     const Station& at = b.line[k];
@@ -144,11 +171,11 @@ void build_tunnels(WorldBuilder& b) {
   for (const StreetKind kind :
        {StreetKind::kTunnelLit, StreetKind::kTunnelDark, StreetKind::kBridge, StreetKind::kCorridor}) {
     for_stretches(
-        b.line, [kind](const Station& s) { return s.kind == kind; },
+        b.line, [kind](const Station& s) { return s.kind == kind || (is_corridor(kind) && is_corridor(s.kind)); },
         [&](int i, int j) {
           if (kind == StreetKind::kBridge) {
             build_bridge(b, i, j);
-          } else if (kind == StreetKind::kCorridor) {
+          } else if (is_corridor(kind)) {
             build_corridor(b, i, j, depth);
             depth += 0.004;
           } else {

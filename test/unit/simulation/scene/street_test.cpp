@@ -199,6 +199,7 @@ TEST_CASE("streets and lit tunnels have corners to be found and a blank corridor
   CHECK(found(StreetKind::kBridge, 2e-3) > 200);
   CHECK(found(StreetKind::kTunnelLit, 4e-3) > 200);
   CHECK(found(StreetKind::kCorridor, 2e-3) < 60);
+  CHECK(found(StreetKind::kFurnishedCorridor, 2e-3) > 200);
 }
 
 TEST_CASE("a plan that makes no sense is refused") {

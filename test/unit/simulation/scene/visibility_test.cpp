@@ -152,9 +152,9 @@ auto tree(const RayWindow& window, const Eigen::Vector3f& eye) {
   };
 }
 
-constexpr StreetKind kKinds[] = {StreetKind::kStreet,     StreetKind::kBridge,   StreetKind::kTunnelLit,
-                                 StreetKind::kTunnelDark, StreetKind::kCorridor, StreetKind::kHighway,
-                                 StreetKind::kCarPark};
+constexpr StreetKind kKinds[] = {StreetKind::kStreet,     StreetKind::kBridge,           StreetKind::kTunnelLit,
+                                 StreetKind::kTunnelDark, StreetKind::kCorridor,         StreetKind::kHighway,
+                                 StreetKind::kCarPark,    StreetKind::kFurnishedCorridor};
 
 TEST_CASE(
     "every pixel's ray hits in its tile what the tree finds, to the last bit, and from elsewhere something else") {
