@@ -61,7 +61,7 @@ class Filter {
   [[nodiscard]] const GnssBias& gnss_bias() const { return gnss_bias_; }
   /// The block's value and covariance become this, without correlation with anything else.
   void reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vector3d& std);
-  /// The prior variance of the receiver's error at kGnssBias or kGnssVelocityBias becomes `ratio` times what it was, (N.5.5): as if it had been
+  /// The prior variance of the receiver's error at kGnssBias or kGnssVelocityBias becomes `ratio` times what it was, (N.5.11): as if it had been
   /// measured as zero, or such a measurement were taken back.
   void rescale_gnss_bias(int at, double ratio);
   /// P += d d' over the base block.
