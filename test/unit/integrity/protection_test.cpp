@@ -60,6 +60,18 @@ CarOptions displaced_return() {
   return options;
 }
 
+/// Silent from 80 s on; meanwhile pulled aside as a camera does that is turned by 1 degree, 15 m/s, none of it claimed.
+CarOptions turned_camera() {
+  CarOptions options;
+  options.seconds = 130.0;
+  options.follows = true;
+  options.fixes = [](double t) { return t < 80.0; };
+  options.fault = [](double t) -> Eigen::Vector3d {
+    return 15.0 * std::sin(1.0 / 57.3) * Eigen::Vector3d(-std::sin(1.8), std::cos(1.8), 0.0) * std::max(0.0, t - 82.0);
+  };
+  return options;
+}
+
 void check_never_smaller(const std::vector<CarSample>& less, const std::vector<CarSample>& more, double from = 0.0) {
   REQUIRE(less.size() == more.size());
   int smaller = 0;
@@ -110,6 +122,12 @@ TEST_CASE("protection: displaced after an outage, the level holds until that is 
   IntegrityConfig hasty;
   hasty.coasting_after = 60.0;  // for no outage at all
   CHECK(misleading(without_witness(displaced_return(), hasty), hasty, kFrequent) > 1e-3);
+}
+
+TEST_CASE("protection: pulled aside by a turned camera in an outage, the level holds the error, without wheels not") {
+  CHECK(misleading(turned_camera(), {}, kRare) == 0.0);
+  IntegrityConfig config;
+  CHECK(misleading(without_witness(turned_camera(), config), config, kRare) > 0.1);
 }
 
 TEST_CASE("protection: less information is never a smaller level") {

@@ -22,6 +22,7 @@ struct CarOptions {
   double every_fix_s = 0.2;
   bool even = false;  ///< innovations of exactly that size, of alternating sign
   std::function<Eigen::Vector3d(double)> fault = [](double) { return Eigen::Vector3d::Zero().eval(); };  ///< m, enu
+  bool follows = false;  ///< the estimate's velocity is that of its place, fault included
   std::function<bool(double)> fixes = [](double) { return true; };
 };
 
@@ -88,7 +89,10 @@ inline std::vector<CarSample> drive(const CarOptions& options, const IntegrityCo
       monitor.add({t_us, true, z.squaredNorm(), 3, 0.02 * z, Eigen::Vector3d::Constant(4e-4)});
     }
     const Eigen::Vector3d off = error + options.fault(t);
-    const Odometry estimate = pose(t_us, car.p + off, car.yaw, rate, options.claim * options.sigma);
+    Odometry estimate = pose(t_us, car.p + off, car.yaw, rate, options.claim * options.sigma);
+    if (options.follows)
+      estimate.velocity +=
+          estimate.T_frame_vehicle.q.conjugate() * (options.fault(t) - options.fault(t - kStep)) / kStep;
     if (at) at(t, monitor);
     const Eigen::Vector3d seen = (estimate.T_frame_vehicle.q.conjugate() * off).cwiseAbs();
     samples.push_back({t, seen, monitor.bound(estimate)});
