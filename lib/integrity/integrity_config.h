@@ -35,12 +35,15 @@ struct IntegrityConfig {
   ErrorScaleConfig tails;
   WitnessConfig witness;
   double correlated_share = 0.5;  ///< of the sigma of a fix: what does not average out, once it is verified
-  double timing_std = 0.01;       ///< s, of the sensors' stamps against each other
-  double fault_prior = 0.002;     ///< probability that a source has failed within `short_lag` and nothing shows it
-  double look_back = 10.0;        ///< s: a fault that is detected now may have begun so long ago
-  double recover = 120.0;         ///< s without contradiction until what contradicted is taken for well
-  double verify = 20.0;           ///< s without contradiction until positions that came back are trusted
-  double coasting_after = 3.5;    ///< s without an accepted position
+  /// m, of the antenna against its calibration: along it is measured by tape to an axle that is not seen, across to the
+  /// centre line, up to the ground.
+  Eigen::Vector3d lever_arm_std{0.1, 0.005, 0.03};
+  double timing_std = 0.01;     ///< s, of the sensors' stamps against each other
+  double fault_prior = 0.002;   ///< probability that a source has failed within `short_lag` and nothing shows it
+  double look_back = 10.0;      ///< s: a fault that is detected now may have begun so long ago
+  double recover = 120.0;       ///< s without contradiction until what contradicted is taken for well
+  double verify = 20.0;         ///< s without contradiction until positions that came back are trusted
+  double coasting_after = 3.5;  ///< s without an accepted position
   Eigen::Vector3d coasting_fault{0.03, 0.01, 0.01};  ///< of the way since: wheels or gyro fail unnoticed
 };
 
@@ -75,6 +78,7 @@ void visit(IntegrityConfig& c, Visitor& v) {
   v.group("tails", c.tails);
   v.group("witness", c.witness);
   v.number("correlated_share", c.correlated_share, 0.0, 1.0);
+  v.vector("lever_arm_std_m", c.lever_arm_std, 0.0, 10.0);
   v.number("timing_std_s", c.timing_std, 0.0, 1.0);
   v.number("fault_prior", c.fault_prior, 1e-9, 1.0);
   v.number("look_back_s", c.look_back, 1.0, 300.0);

@@ -135,6 +135,14 @@ void ProtectionMonitor::raise(int risk, const Eigen::Vector3d& level, Hypothesis
   reached = reached.cwiseMax(level);
 }
 
+// (P.3.3)
+void ProtectionMonitor::turn_lever_arm(const Eigen::Matrix3d& R_frame_vehicle) {
+  const Eigen::Vector3d variance = config_.lever_arm_std.cwiseAbs2();
+  if (!coasting()) lever_enu_ = R_frame_vehicle * variance.asDiagonal() * R_frame_vehicle.transpose();
+  const Eigen::Matrix3d turned = R_frame_vehicle.transpose() * lever_enu_ * R_frame_vehicle;
+  lever_variance_ = variance.cwiseMax(turned.diagonal());
+}
+
 // (P.3.1)
 void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out) const {
   const bool begins = seconds_between(*first_us_, estimate.t_us) < config_.verify;
@@ -143,7 +151,8 @@ void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out
   const Eigen::Vector3d common = share * share * (R * fix_variance_.asDiagonal() * R.transpose()).diagonal();
   const double late = config_.timing_std * turning_ * kCorrectionTime;  // a heading late by that, followed so long
   const Eigen::Vector3d timing(0.0, late * late, 0.0);
-  const Eigen::Vector3d sigma = (separation_.now().cov.diagonal() + common + timing).cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector3d sigma =
+      (separation_.now().cov.diagonal() + lever_variance_ + common + timing).cwiseMax(0.0).cwiseSqrt();
   const std::array<double, kRisks> risks = {config_.frequent_risk, config_.rare_risk};
   for (int r = 0; r < kRisks; ++r) {
     const double k = noise_.quantile(estimate.t_us, risks[static_cast<std::size_t>(r)] / kAxes);
@@ -151,7 +160,7 @@ void ProtectionMonitor::apply_no_fault(const Odometry& estimate, Protection& out
   }
 }
 
-// (P.4.7)
+// (P.4.8)
 void ProtectionMonitor::apply_receiver(Protection& out) const {
   if (!sound_) return;
   const Separation s = separation_.since(*sound_);
@@ -160,7 +169,8 @@ void ProtectionMonitor::apply_receiver(Protection& out) const {
     const double risk = std::min(0.5, risks[static_cast<std::size_t>(r)] / (kAxes * config_.fault_prior));
     Eigen::Vector3d level;
     for (int a = 0; a < 3; ++a) {
-      const double own = noise_.quantile(out.pose_us, risk) * std::sqrt(std::max(0.0, sound_->cov(a, a)));
+      const double own =
+          noise_.quantile(out.pose_us, risk) * std::sqrt(std::max(0.0, sound_->cov(a, a)) + lever_variance_(a));
       level(a) = std::abs(s.d(a)) + std::hypot(own, separation_.quantile(a, risk) * s.sigma(a));
     }
     raise(r, level, Hypothesis::kReceiver, out);
@@ -179,7 +189,7 @@ void ProtectionMonitor::apply_anchor(Protection& out) const {
       continue;
     }
     const double k = noise_.quantile(out.pose_us, risks[static_cast<std::size_t>(r)] / kAxes);
-    const Eigen::Vector3d variance = anchor_.cov.diagonal().cwiseMax(0.0) + s.sigma.cwiseAbs2();
+    const Eigen::Vector3d variance = anchor_.cov.diagonal().cwiseMax(0.0) + lever_variance_ + s.sigma.cwiseAbs2();
     raise(r, s.d.cwiseAbs() + k * variance.cwiseSqrt(), hypothesis, out);
   }
 }
@@ -225,6 +235,7 @@ Protection ProtectionMonitor::bound(const Odometry& estimate) {
     out.level.fill(all(kInfinity));
     out.hypothesis = Hypothesis::kNoBound;
   } else {
+    turn_lever_arm(estimate.T_frame_vehicle.R());
     apply_no_fault(estimate, out);
     if (!anchored_) sound_ = separation_.before(config_.witness.short_lag);
     if (!anchored_ || returned_) apply_receiver(out);

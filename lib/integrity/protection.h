@@ -71,8 +71,8 @@ class ProtectionMonitor {
     ErrorScale::archive(self.noise_, a);
     ErrorScale::archive(self.whiteness_, a);
     a(self.fix_variance_, self.mean_innovation_, self.innovation_weight_, self.innovation_us_, self.fix_us_,
-      self.refused_us_, self.failed_us_, self.first_us_, self.checked_us_, self.turning_, self.fix_way_, self.anchored_,
-      self.returned_);
+      self.refused_us_, self.failed_us_, self.first_us_, self.checked_us_, self.lever_enu_, self.lever_variance_,
+      self.turning_, self.fix_way_, self.anchored_, self.returned_);
     Anchor::archive(self.anchor_, a);
     Anchor sound = self.sound_.value_or(Anchor{});
     bool known = self.sound_.has_value();
@@ -94,6 +94,7 @@ class ProtectionMonitor {
   void apply_anchor(Protection& out) const;
   void apply_coasting(Protection& out) const;
   void raise(int risk, const Eigen::Vector3d& level, Hypothesis hypothesis, Protection& out) const;
+  void turn_lever_arm(const Eigen::Matrix3d& R_frame_vehicle);
   void judge(Protection& out) const;
 
   IntegrityConfig config_;
@@ -104,10 +105,12 @@ class ProtectionMonitor {
   Eigen::Vector3d mean_innovation_ = Eigen::Vector3d::Zero();  ///< of its own sigma, decaying
   double innovation_weight_ = 0.0;                             ///< how many it is of
   std::optional<int64_t> innovation_us_, fix_us_, refused_us_, failed_us_, first_us_, checked_us_;
+  Eigen::Matrix3d lever_enu_ = Eigen::Matrix3d::Zero();       ///< m2, of the lever arm as the last positions saw it
+  Eigen::Vector3d lever_variance_ = Eigen::Vector3d::Zero();  ///< m2, likewise, axes of the newest pose
   double turning_ = 0.0;  ///< m/s2, the last seconds' largest lateral acceleration, decaying
   double fix_way_ = 0.0;  ///< m, driven until the last position
   bool anchored_ = false;
-  std::optional<Anchor> sound_;  ///< before positions that may have failed unnoticed, (P.4.7)
+  std::optional<Anchor> sound_;  ///< before positions that may have failed unnoticed, (P.4.8)
   Anchor anchor_;                ///< the pose from before positions became suspect, (P.5.n)
   bool returned_ = false;        ///< the anchor is an outage's, not a contradiction's
 };

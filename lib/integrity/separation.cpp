@@ -97,7 +97,7 @@ double SeparationMonitor::unwitnessed_time(const Anchor& anchor) const {
   return std::clamp(seconds_between(anchor.t_us, *position_us_) + config_.coasting_after, 0.0, until_now);
 }
 
-// (P.4.1) to (P.4.3)
+// (P.4.1) to (P.4.4)
 Separation SeparationMonitor::since(const Anchor& anchor) const {
   Separation s;
   const double way = now_.way - anchor.way;
@@ -106,14 +106,19 @@ Separation SeparationMonitor::since(const Anchor& anchor) const {
   Eigen::Vector3d dead_reckoned = now_.own - anchor.own;
   if (s.witnessed) dead_reckoned = turned(anchor.yaw - anchor.witness_yaw, now_.witness - anchor.witness);
   s.d = R_vehicle_frame_ * (now_.p - anchor.p - dead_reckoned);
-  const Eigen::Vector3d turn(0.0, anchor.yaw_variance, 0.0);  // rad2, of the way's direction
+  const Eigen::Vector3d yaw_arm = R_vehicle_frame_ * Eigen::Vector3d::UnitZ().cross(dead_reckoned);  // m per rad
+  const Ratio& turn = ratio_[kAcross];
+  const double half = 0.5 * seconds_between(anchor.t_us, now_.t_us);
+  // rad2: what the yaw rate bias turned the way by; across the car it is in the ratio.
+  const double turned_by = (turn.cov(2, 2) + turn.mean(2) * turn.mean(2)) * half * half;
   for (int a = 0; a < 3; ++a) {
     const double floor = config_.witness.floor * config_.witness.floor + std::max(0.0, now_.cov(a, a));
     if (s.witnessed) {
       const Ratio& ratio = ratio_[static_cast<std::size_t>(a)];
       s.d(a) -= ratio.mean.dot(ways);
+      const double heading = (anchor.yaw_variance + (a == kAcross ? 0.0 : turned_by)) * yaw_arm(a) * yaw_arm(a);
       const double share = config_.witness.way_std(a);
-      s.sigma(a) = std::sqrt(floor + (share * share + turn(a)) * way * way + ways.dot(ratio.cov * ways));
+      s.sigma(a) = std::sqrt(floor + share * share * way * way + heading + ways.dot(ratio.cov * ways));
     } else {
       const double drift = config_.witness.unwitnessed_std(a) * unwitnessed_time(anchor);
       s.sigma(a) = std::sqrt(floor + drift * drift);
@@ -144,7 +149,7 @@ bool SeparationMonitor::contradicted() const {
   return false;
 }
 
-// (P.4.4), (P.4.5): a Kalman filter per axis for the ratio, and the scale of what it leaves.
+// (P.4.5), (P.4.6): a Kalman filter per axis for the ratio, and the scale of what it leaves.
 void SeparationMonitor::learn() {
   for (std::size_t lag = 0; lag < scale_.size(); ++lag) {
     const std::optional<Lagged> l = lagged(lag);

@@ -54,9 +54,9 @@ class SeparationMonitor {
   /// Takes the estimate's newest pose; the separations below are at it.
   void step(const Odometry& estimate);
 
-  /// Whether a separation over the short or the long lag is larger than learnt, (P.4.6).
+  /// Whether a separation over the short or the long lag is larger than learnt, (P.4.7).
   [[nodiscard]] bool contradicted() const;
-  /// Learns from the newest separations, (P.4.4), (P.4.5): for the caller to call while nothing contradicts.
+  /// Learns from the newest separations, (P.4.5), (P.4.6): for the caller to call while nothing contradicts.
   void learn();
 
   [[nodiscard]] const Anchor& now() const { return now_; }
@@ -96,7 +96,7 @@ class SeparationMonitor {
     Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
   };
   [[nodiscard]] Eigen::Vector3d ways_since(const Anchor& anchor) const;
-  /// s, for which the receiver may have drifted since, (P.4.8).
+  /// s, for which the receiver may have drifted since, (P.4.9).
   [[nodiscard]] double unwitnessed_time(const Anchor& anchor) const;
   /// The separation over one of the two lags, and the way that it is over.
   struct Lagged {

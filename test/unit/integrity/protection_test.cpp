@@ -32,6 +32,7 @@ IntegrityConfig gaussian() {
   IntegrityConfig config;
   config.tails = {.prior_dof = 1000.0, .memory = 1.0, .correlation = 1000.0};
   config.correlated_share = 0.0;
+  config.lever_arm_std.setZero();
   return config;
 }
 
@@ -122,6 +123,20 @@ TEST_CASE("protection: displaced after an outage, the level holds until that is 
   IntegrityConfig hasty;
   hasty.coasting_after = 60.0;  // for no outage at all
   CHECK(misleading(without_witness(displaced_return(), hasty), hasty, kFrequent) > 1e-3);
+}
+
+TEST_CASE(
+    "protection: an antenna 0.3 m ahead of where it is said to be is within the levels, without an allowance not") {
+  CarOptions options;
+  options.fault = [](double t) -> Eigen::Vector3d {
+    const double yaw = 0.3 + 0.1 * std::clamp(t - 60.0, 0.0, 15.0);
+    return 0.3 * Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+  };
+  CHECK(misleading(options, {}, kFrequent) <= 1e-3);
+  CHECK(misleading(options, {}, kRare) == 0.0);
+  IntegrityConfig exact;
+  exact.lever_arm_std.setZero();
+  CHECK(misleading(options, exact, kFrequent) > 0.1);
 }
 
 TEST_CASE("protection: pulled aside by a turned camera in an outage, the level holds the error, without wheels not") {
