@@ -58,6 +58,7 @@ void SeparationMonitor::step(const Odometry& estimate) {
     const Eigen::Vector3d moved = 0.5 * dt * (velocity + velocity_);
     now_.own += moved;
     now_.way += moved.norm();
+    now_.forward += dt * estimate.velocity.x();
     now_.bend += moved.norm() * estimate.velocity.x() * estimate.angular_rate.z();
     const double kept = std::max({config_.witness.short_lag, config_.witness.long_lag, config_.look_back}) + 2.0;
     while (!anchors_.empty() && seconds_between(anchors_.front().t_us, estimate.t_us) > kept) anchors_.pop_front();
@@ -87,7 +88,7 @@ std::optional<Anchor> SeparationMonitor::before(double lag) const {
 }
 
 Eigen::Vector3d SeparationMonitor::ways_since(const Anchor& anchor) const {
-  const double way = now_.way - anchor.way;
+  const double way = now_.forward - anchor.forward;
   return {way, now_.bend - anchor.bend, 0.5 * way * seconds_between(anchor.t_us, now_.t_us)};
 }
 
@@ -156,9 +157,9 @@ void SeparationMonitor::learn() {
     if (!l) continue;
     for (std::size_t a = 0; a < 3; ++a) {
       const auto axis = static_cast<Eigen::Index>(a);
+      if (std::abs(l->ways(0)) < kLeastWay) continue;  // standing shows nothing of what a way is off by
       const double normalised = l->separation.d(axis) / l->separation.sigma(axis);
       scale_[lag][a].add(now_.t_us, normalised * normalised, 1.0);
-      if (l->ways(0) < kLeastWay) continue;
       Ratio& ratio = ratio_[a];
       const WitnessConfig& w = config_.witness;
       if (lag == 0) ratio.cov(0, 0) += w.ratio_walk * w.ratio_walk * step_;

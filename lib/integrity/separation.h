@@ -26,11 +26,13 @@ struct Anchor {
   int64_t witness_track = -1;                         ///< which unbroken track of the witness; -1: none
   Eigen::Vector3d own = Eigen::Vector3d::Zero();      ///< m, the estimate's velocity summed up
   double way = 0.0;                                   ///< m, driven
+  double forward = 0.0;                               ///< m, driven forward less driven in reverse
   double bend = 0.0;                                  ///< m2/s2, lateral acceleration times way, summed up
 
   template <class Self, class Archive>
   static void archive(Self& s, Archive& a) {
-    a(s.t_us, s.p, s.yaw, s.cov, s.yaw_variance, s.witness, s.witness_yaw, s.witness_track, s.own, s.way, s.bend);
+    a(s.t_us, s.p, s.yaw, s.cov, s.yaw_variance, s.witness, s.witness_yaw, s.witness_track, s.own, s.way, s.forward,
+      s.bend);
   }
 };
 
