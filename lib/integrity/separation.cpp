@@ -11,7 +11,9 @@ namespace {
 constexpr int64_t kAnchorPeriod_us = 1'000'000;
 constexpr int64_t kWitnessMaxAge_us = 200'000;
 constexpr double kLeastWay = 3.0;  // m, below that a ratio is noise
+constexpr int kAlong = 0;
 constexpr int kAcross = 1;
+constexpr int kUp = 2;
 constexpr int kYaw = 5;  // of cov_pose
 
 Eigen::Vector3d turned(double yaw, const Eigen::Vector3d& v) {
@@ -87,9 +89,11 @@ std::optional<Anchor> SeparationMonitor::before(double lag) const {
   return younger == anchors_.begin() ? anchors_.front() : *std::prev(younger);
 }
 
-Eigen::Vector3d SeparationMonitor::ways_since(const Anchor& anchor) const {
-  const double way = now_.forward - anchor.forward;
-  return {way, now_.bend - anchor.bend, 0.5 * way * seconds_between(anchor.t_us, now_.t_us)};
+// (P.4.2): scale and mounting turn the way as it is, grade follows the road.
+Eigen::Vector3d SeparationMonitor::ways_since(const Anchor& anchor, int axis, const Eigen::Vector3d& way) const {
+  const double forward = now_.forward - anchor.forward;
+  return {axis == kUp ? forward : way.x(), now_.bend - anchor.bend,
+          0.5 * forward * seconds_between(anchor.t_us, now_.t_us)};
 }
 
 double SeparationMonitor::unwitnessed_time(const Anchor& anchor) const {
@@ -98,28 +102,39 @@ double SeparationMonitor::unwitnessed_time(const Anchor& anchor) const {
   return std::clamp(seconds_between(anchor.t_us, *position_us_) + config_.coasting_after, 0.0, until_now);
 }
 
+// (P.4.2): what scale and mounting, learnt along and across, do to the part of the way that a turn left aside.
+SeparationMonitor::Coupled SeparationMonitor::coupling(const Eigen::Vector3d& way) const {
+  const Ratio &scale = ratio_[kAlong], &mounting = ratio_[kAcross];
+  const double aside = way.y();
+  return {{-mounting.mean(0) * aside, scale.mean(0) * aside, 0.0},
+          {mounting.cov(0, 0) * aside * aside, scale.cov(0, 0) * aside * aside, 0.0}};
+}
+
 // (P.4.1) to (P.4.4)
 Separation SeparationMonitor::since(const Anchor& anchor) const {
   Separation s;
   const double way = now_.way - anchor.way;
-  const Eigen::Vector3d ways = ways_since(anchor);
   s.witnessed = anchor.witness_track >= 0 && anchor.witness_track == now_.witness_track;
   Eigen::Vector3d dead_reckoned = now_.own - anchor.own;
   if (s.witnessed) dead_reckoned = turned(anchor.yaw - anchor.witness_yaw, now_.witness - anchor.witness);
   s.d = R_vehicle_frame_ * (now_.p - anchor.p - dead_reckoned);
+  s.way = R_vehicle_frame_ * dead_reckoned;
   const Eigen::Vector3d yaw_arm = R_vehicle_frame_ * Eigen::Vector3d::UnitZ().cross(dead_reckoned);  // m per rad
   const Ratio& turn = ratio_[kAcross];
   const double half = 0.5 * seconds_between(anchor.t_us, now_.t_us);
   // rad2: what the yaw rate bias turned the way by; across the car it is in the ratio.
   const double turned_by = (turn.cov(2, 2) + turn.mean(2) * turn.mean(2)) * half * half;
+  const Coupled coupled = coupling(s.way);
   for (int a = 0; a < 3; ++a) {
     const double floor = config_.witness.floor * config_.witness.floor + std::max(0.0, now_.cov(a, a));
     if (s.witnessed) {
       const Ratio& ratio = ratio_[static_cast<std::size_t>(a)];
-      s.d(a) -= ratio.mean.dot(ways);
+      const Eigen::Vector3d ways = ways_since(anchor, a, s.way);
+      s.d(a) -= ratio.mean.dot(ways) + coupled.mean(a);
       const double heading = (anchor.yaw_variance + (a == kAcross ? 0.0 : turned_by)) * yaw_arm(a) * yaw_arm(a);
       const double share = config_.witness.way_std(a);
-      s.sigma(a) = std::sqrt(floor + share * share * way * way + heading + ways.dot(ratio.cov * ways));
+      s.sigma(a) =
+          std::sqrt(floor + share * share * way * way + heading + coupled.variance(a) + ways.dot(ratio.cov * ways));
     } else {
       const double drift = config_.witness.unwitnessed_std(a) * unwitnessed_time(anchor);
       s.sigma(a) = std::sqrt(floor + drift * drift);
@@ -132,7 +147,8 @@ std::optional<SeparationMonitor::Lagged> SeparationMonitor::lagged(std::size_t l
   const double wanted = lag == 0 ? config_.witness.short_lag : config_.witness.long_lag;
   const std::optional<Anchor> anchor = before(wanted);
   if (!anchor || seconds_between(anchor->t_us, now_.t_us) < wanted) return std::nullopt;
-  Lagged l{since(*anchor), ways_since(*anchor), seconds_between(anchor->t_us, now_.t_us)};
+  Lagged l{since(*anchor), {}, seconds_between(anchor->t_us, now_.t_us)};
+  for (int a = 0; a < 3; ++a) l.ways[static_cast<std::size_t>(a)] = ways_since(*anchor, a, l.separation.way);
   if (!l.separation.witnessed) return std::nullopt;
   return l;
 }
@@ -157,7 +173,8 @@ void SeparationMonitor::learn() {
     if (!l) continue;
     for (std::size_t a = 0; a < 3; ++a) {
       const auto axis = static_cast<Eigen::Index>(a);
-      if (std::abs(l->ways(0)) < kLeastWay) continue;  // standing shows nothing of what a way is off by
+      const Eigen::Vector3d& ways = l->ways[a];
+      if (std::abs(ways(0)) < kLeastWay) continue;  // standing shows nothing of what a way is off by
       const double normalised = l->separation.d(axis) / l->separation.sigma(axis);
       scale_[lag][a].add(now_.t_us, normalised * normalised, 1.0);
       Ratio& ratio = ratio_[a];
@@ -166,10 +183,10 @@ void SeparationMonitor::learn() {
       if (lag == 0 && axis == kAcross) ratio.cov(2, 2) += w.yaw_rate_walk * w.yaw_rate_walk * step_;
       // What the ratio does not explain; separations over one lag share their way.
       const double sigma = l->separation.sigma(axis);
-      const double R = (sigma * sigma - l->ways.dot(ratio.cov * l->ways)) * l->lag / step_;
-      const Eigen::Vector3d gain = ratio.cov * l->ways / (l->ways.dot(ratio.cov * l->ways) + R);
+      const double R = (sigma * sigma - ways.dot(ratio.cov * ways)) * l->lag / step_;
+      const Eigen::Vector3d gain = ratio.cov * ways / (ways.dot(ratio.cov * ways) + R);
       ratio.mean += gain * l->separation.d(axis);
-      ratio.cov = (ratio.cov - gain * (ratio.cov * l->ways).transpose()).eval();
+      ratio.cov = (ratio.cov - gain * (ratio.cov * ways).transpose()).eval();
       ratio.cov = (0.5 * (ratio.cov + ratio.cov.transpose())).eval();
     }
   }

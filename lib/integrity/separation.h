@@ -40,6 +40,7 @@ struct Anchor {
 struct Separation {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();      ///< m, estimate minus dead reckoning
   Eigen::Vector3d sigma = Eigen::Vector3d::Zero();  ///< m, of d where nothing has failed
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();    ///< m, dead reckoned
   bool witnessed = false;                           ///< by something else than the estimate's own velocity
 };
 
@@ -97,13 +98,17 @@ class SeparationMonitor {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     Eigen::Matrix3d cov = Eigen::Matrix3d::Zero();
   };
-  [[nodiscard]] Eigen::Vector3d ways_since(const Anchor& anchor) const;
+  [[nodiscard]] Eigen::Vector3d ways_since(const Anchor& anchor, int axis, const Eigen::Vector3d& way) const;
+  struct Coupled {
+    Eigen::Vector3d mean, variance;  ///< m, m2
+  };
+  [[nodiscard]] Coupled coupling(const Eigen::Vector3d& way) const;
   /// s, for which the receiver may have drifted since, (P.4.9).
   [[nodiscard]] double unwitnessed_time(const Anchor& anchor) const;
   /// The separation over one of the two lags, and the way that it is over.
   struct Lagged {
     Separation separation;
-    Eigen::Vector3d ways = Eigen::Vector3d::Zero();  ///< m; m2/s2; m s
+    std::array<Eigen::Vector3d, 3> ways;  ///< by axis: m; m2/s2; m s
     double lag = 0.0;
   };
   [[nodiscard]] std::optional<Lagged> lagged(std::size_t lag) const;

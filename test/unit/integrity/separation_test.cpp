@@ -16,13 +16,17 @@ struct Beside {
   void go(double seconds, const Eigen::Vector3d& moved_by = Eigen::Vector3d::Zero()) {
     for (int i = 0; i < static_cast<int>(seconds * 10.0 + 0.5); ++i) {
       t += 0.1;
-      car.step(t, 0.1);
+      car.yaw += 0.1 * TrueCar::rate(t);
+      car.p += 0.1 * speed * Eigen::Vector3d(std::cos(car.yaw), std::sin(car.yaw), 0.0);
       moved += 0.1 * moved_by;
       yaw += 0.1 * (TrueCar::rate(t) + 0.001);
-      p += 1.5 * 1.01 * Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+      p += 0.1 * speed * scale * Eigen::Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
       const auto t_us = static_cast<int64_t>(t * 1e6 + 0.5);
-      if (witnessed) monitor.add_witness(pose(t_us, p, yaw, TrueCar::rate(t), 0.1), jumps);
-      monitor.step(pose(t_us, car.p + moved, car.yaw, TrueCar::rate(t), 0.01));
+      Odometry witness = pose(t_us, p, yaw, TrueCar::rate(t), 0.1);
+      Odometry estimate = pose(t_us, car.p + moved, car.yaw, TrueCar::rate(t), 0.01);
+      witness.velocity.x() = estimate.velocity.x() = speed;
+      if (witnessed) monitor.add_witness(witness, jumps);
+      monitor.step(estimate);
       if (!monitor.contradicted() && learns) monitor.learn();
       contradicted = contradicted || monitor.contradicted();
     }
@@ -31,7 +35,7 @@ struct Beside {
   SeparationMonitor monitor;
   TrueCar car;
   Eigen::Vector3d p = Eigen::Vector3d::Zero(), moved = Eigen::Vector3d::Zero();
-  double t = 0.0, yaw = 0.8;
+  double t = 0.0, yaw = 0.8, scale = 1.01, speed = 15.0;
   int64_t jumps = 0;
   bool witnessed = true, learns = true, contradicted = false;
 };
@@ -54,6 +58,24 @@ TEST_CASE("separation: the witness's scale and turn are learnt, so that a slow d
   CHECK(across.contradicted);
   b.go(5.0);
   CHECK_FALSE(b.contradicted);
+}
+
+TEST_CASE("separation: a wheel scale learnt on a straight holds in a bend and in reverse; a drift is found there too") {
+  Beside b;
+  b.scale = 1.03;
+  b.go(59.0);
+  Beside pulled = b;
+  b.go(30.0);  // a bend of 1.5 rad
+  const Separation bend = b.monitor.since(*b.monitor.before(20.0));
+  CHECK(std::abs(bend.d.x()) < 3.0 * bend.sigma.x());  // 3 % of 300 m is 9 m
+  CHECK(std::abs(bend.d.y()) < 3.0 * bend.sigma.y());
+  b.speed = -5.0;
+  b.go(20.0);
+  const Separation reverse = b.monitor.since(*b.monitor.before(8.0));
+  CHECK(std::abs(reverse.d.x()) < 0.05);  // 3 % of 40 m, on either side of none, is 1.2 m
+  CHECK_FALSE(b.contradicted);
+  pulled.go(12.0, {0.2, 0.2, 0.0});
+  CHECK(pulled.contradicted);
 }
 
 TEST_CASE("separation: without having learnt, the same drift is within what dead reckoning may be off by") {
