@@ -85,6 +85,8 @@ void add_paper_a(CLI::App& paper) {
       ->add_option("--network-model", request.network_model,
                    "ONNX file of a learned front end, in place of the configuration's")
       ->check(CLI::ExistingFile);
+  command->add_flag("--with-wheels", request.with_wheels,
+                    "Lengths by the wheels; without them each map that one eye starts has a length of its own");
   add_sigma(*command, "--process-sigma-m", request.literal.process_sigma, "of the filter as printed");
   add_sigma(*command, "--measurement-sigma-m", request.literal.measurement_sigma, "of the filter as printed");
   add_sigma(*command, "--position-sigma-m", request.motion.position_sigma, "of the filter with a motion model");

@@ -60,6 +60,10 @@ class Paper(unittest.TestCase):
             self.assertNotAlmostEqual(motion, raw, 5)
             self.assertGreater(float(rows[f"EKF {name}, literal"][2]), 0.7)  # trace
             self.assertLess(float(rows[f"EKF {name}, literal"][3]), 5.0)  # s until it settles
+        done = roadfix("paper", "a", self.drive, "--config", VEHICLE, "--front-end", "klt", "--with-wheels", "--out", self.folder / "lengths")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("vision with the wheels' lengths", done.stdout)
+        self.assertNotEqual(rows_of(self.folder / "lengths/table_1.csv")["KLT"][0], rows["KLT"][0])
         self.assertEqual(len(rows_of(out / "sensitivity.csv")), 26)
         self.assertIn("SuperPoint 2.911", text)
         done = roadfix("paper", "a", self.drive, "--config", VEHICLE, "--front-end", "superpoint", "--out", self.folder / "learned")

@@ -13,6 +13,7 @@ struct PaperARequest {
   PaperRequest drive;
   std::vector<std::string> front_ends;  ///< klt, orb, sift, superpoint, xfeat, aliked
   std::filesystem::path network_model;  ///< ONNX file of a learned front end; the configuration's where empty
+  bool with_wheels = false;  ///< maps take their lengths from the wheels; without, each has its own unit of length
   LiteralTrajectoryConfig literal;
   MotionTrajectoryConfig motion;
 };
