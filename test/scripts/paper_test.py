@@ -64,6 +64,12 @@ class Paper(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("vision with the wheels' lengths", done.stdout)
         self.assertNotEqual(rows_of(self.folder / "lengths/table_1.csv")["KLT"][0], rows["KLT"][0])
+        # What is left out is as if the drive did not have it.
+        without = self.folder / "without.lcm"
+        self.assertEqual(roadfix("log", "filter", self.drive, "--channel", "WHEELS", "--invert", "--out", without).returncode, 0)
+        done = roadfix("paper", "a", without, "--config", VEHICLE, "--front-end", "klt", "--out", self.folder / "without")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(rows_of(self.folder / "without/table_1.csv")["KLT"], rows["KLT"])
         self.assertEqual(len(rows_of(out / "sensitivity.csv")), 26)
         self.assertIn("SuperPoint 2.911", text)
         done = roadfix("paper", "a", self.drive, "--config", VEHICLE, "--front-end", "superpoint", "--out", self.folder / "learned")
