@@ -9,6 +9,9 @@ namespace roadfix::navigation {
 
 namespace {
 
+// Passes of (N.6.17), the share of its standard deviations by which the last one may move, and the least of those.
+constexpr int kMostPasses = 8;
+constexpr double kSettled = 0.3, kLeastVariance = 1e-16;
 constexpr int kEnoughTracks = 3;       // of an update, to judge the camera by
 constexpr double kShortestStep = 0.2;  // s, at most, that one picture counts for in the trial
 
@@ -26,6 +29,7 @@ CameraControl::CameraControl(const CameraTuning& tuning, const CameraFacts& fact
     : tuning_(tuning), left_(facts.left), stamps_(facts.rate, facts.stamp_jitter), update_(tuning.tracks) {
   if (facts.right) right_.emplace(*facts.right);
   window_.two_eyes = right_.has_value();
+  chosen_.reserve(static_cast<size_t>(tuning.tracks_per_update));
 }
 
 void CameraControl::add(const TrackPicture& picture, int64_t id) {
@@ -104,7 +108,11 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
   add_pose(filter, t_us);
   tracks_.add(seen, state.clones.back().id);
   const bool full = static_cast<int>(state.clones.size()) > tuning_.poses;
-  try_tracks(state, full);
+  choose_tracks(state, full);
+  try_tracks(state);
+  const bool iterated = update_.counts().residual_sum > tuning_.iterate_above * update_.counts().dof_sum;
+  std::optional<State> settled;
+  if (iterated) settled = iterate(state);
   judge(dt_s);
   const TrackCounts& counts = update_.counts();
   AidingRecord record = record_of(AidingSource::kCameraTracks, AidingStatus::kGated, now.picture.t_us, now.id);
@@ -116,9 +124,12 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
     record.innovation_variance[0] = 1.0;
   }
   if (fitness_ == CameraFitness::kFit && counts.used > 0) {
-    rows_.begin(state);
-    rows_.add(update_.rows(), Columns(state));
-    record.status = rows_.apply(state) ? AidingStatus::kAccepted : AidingStatus::kBadInput;
+    if (!iterated) {
+      record.status = apply(state) ? AidingStatus::kAccepted : AidingStatus::kBadInput;
+    } else if (settled) {
+      state = std::move(*settled);
+      record.status = AidingStatus::kAccepted;
+    }
   } else if (fitness_ != CameraFitness::kFit) {
     record.status = AidingStatus::kBadQuality;
   }
@@ -150,7 +161,30 @@ void CameraControl::add_pose(Filter& filter, int64_t t_us) {
   state.carried().middleRows<3>(at) += dt * state.carried().middleRows<3>(kVel);
 }
 
-void CameraControl::try_tracks(const State& state, bool full) {
+void CameraControl::choose_tracks(const State& state, bool full) {
+  chosen_.clear();
+  const int64_t oldest = state.clones.front().id;
+  const auto room = static_cast<size_t>(tuning_.tracks_per_update);
+  // Longest first: their sightings tell most, and there is a limit to what one picture may cost.
+  for (int wanted = kMaxViews; wanted >= tuning_.tracks.min_sightings; --wanted) {
+    for (Track& track : tracks_.tracks()) {
+      if (chosen_.size() >= room) break;
+      const bool leaving = full && track.count > 0 && track.seen.front().clone == oldest;
+      if (track.count != wanted || (track.alive && !leaving)) continue;
+      ChosenTrack& chosen = chosen_.emplace_back();
+      chosen.count = static_cast<size_t>(track.count);
+      for (size_t i = 0; i < chosen.count; ++i) {
+        const Sighting& s = track.seen[i];
+        const auto view = static_cast<int>(state.find_clone(s.clone) - state.clones.data());
+        chosen.seen[i] = {view, s.left, s.right, s.sigma_px, s.walk_px2, s.right_sigma_px};
+      }
+      track.use_up();
+    }
+  }
+  tracks_.drop_ended();
+}
+
+void CameraControl::try_tracks(const State& state) {
   const Mean& x = state.x;
   window_.camera = {x.T_imu_camera, x.lens, x.T_left_right};
   window_.views.clear();
@@ -170,26 +204,35 @@ void CameraControl::try_tracks(const State& state, bool full) {
     row += height;
   }
   update_.begin(window_);
-  const int64_t oldest = state.clones.front().id;
-  int room = tuning_.tracks_per_update;
-  std::array<ViewSighting, kMaxViews> seen;
-  // Longest first: their sightings tell most, and there is a limit to what one picture may cost.
-  for (int wanted = kMaxViews; wanted >= tuning_.tracks.min_sightings && room > 0; --wanted) {
-    for (Track& track : tracks_.tracks()) {
-      if (track.count != wanted || room <= 0) continue;
-      const bool leaving = full && track.seen.front().clone == oldest;
-      if (track.alive && !leaving) continue;
-      --room;
-      for (int i = 0; i < track.count; ++i) {
-        const Sighting& s = track.seen[static_cast<size_t>(i)];
-        const auto view = static_cast<int>(state.find_clone(s.clone) - state.clones.data());
-        seen[static_cast<size_t>(i)] = {view, s.left, s.right, s.sigma_px, s.walk_px2, s.right_sigma_px};
-      }
-      (void)update_.add({seen.data(), static_cast<size_t>(track.count)});
-      track.use_up();
-    }
+  for (const ChosenTrack& track : chosen_) (void)update_.add({track.seen.data(), track.count});
+}
+
+bool CameraControl::apply(State& state) {
+  rows_.begin(state);
+  rows_.add(update_.rows(), Columns(state));
+  return rows_.apply(state);
+}
+
+/// (N.6.17): the state after an iterated update; nothing where it breaks or does not settle.
+std::optional<State> CameraControl::iterate(const State& prior) {
+  const int n = prior.size();
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(n);
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    State state = prior;
+    state.retract(moved);
+    // About these means the prior expects the errors that lead back to its own.
+    state.hold(BaseVector::Zero());
+    state.expected().head(n) = -moved;
+    try_tracks(state);
+    if (update_.counts().used == 0 || !apply(state)) return std::nullopt;
+    const Eigen::VectorXd step = state.expected().head(n);
+    moved += step;
+    const Eigen::ArrayXd sigma = state.P().diagonal().head(n).array().max(kLeastVariance).sqrt();
+    if (pass == 0 || (step.array().abs() / sigma).maxCoeff() > kSettled) continue;
+    state.release();
+    return state;
   }
-  tracks_.drop_ended();
+  return std::nullopt;
 }
 
 /// (N.6.14): a camera whose tracks do not fit what else is known, turned, late, or looking at its own cover, is not used

@@ -73,9 +73,18 @@ class CameraControl {
     TrackPicture picture;
   };
 
+  /// A finished track, seen from the window's poses.
+  struct ChosenTrack {
+    size_t count = 0;
+    std::array<ViewSighting, kMaxViews> seen;
+  };
+
   [[nodiscard]] bool makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const;
   void add_pose(Filter& filter, int64_t t_us);
-  void try_tracks(const State& state, bool full);
+  void choose_tracks(const State& state, bool full);
+  void try_tracks(const State& state);
+  [[nodiscard]] bool apply(State& state);
+  [[nodiscard]] std::optional<State> iterate(const State& prior);
   void judge(double dt_s);
   void drop_oldest(State& state);
 
@@ -86,6 +95,7 @@ class CameraControl {
   TrackStore tracks_;
   TrackUpdate update_;
   TrackWindow window_;
+  std::vector<ChosenTrack> chosen_;
   Update rows_;
   std::deque<Waiting> waiting_;
   TrackPicture last_;

@@ -14,6 +14,7 @@ struct CameraTuning {
   double judged_over = 1.0;     ///< s, memory of that mean
   double trial = 1.0;           ///< s of pictures that must fit before the camera is used, the first time
   double trial_again = 5.0;     ///< s, after it was found unfit
+  double iterate_above = 4.0;   ///< mean square of residuals over noise, beyond which an update is iterated, (N.6.17)
   /// rad and m, of the camera's mounting, whatever the calibration claims: a bracket that was knocked is off by two
   /// degrees, and a prior that is a little too wide costs nothing, as the fixes show the rest in seconds (N.6.15).
   double turn_floor = 0.009, place_floor = 0.02;
@@ -40,6 +41,7 @@ void visit(CameraTuning& c, Visitor& v) {
   v.number("judged_over_s", c.judged_over, 0.1, 100.0);
   v.number("trial_s", c.trial, 0.0, 100.0);
   v.number("trial_again_s", c.trial_again, 0.0, 1000.0);
+  v.number("iterate_above", c.iterate_above, 1.0, 1e9);
   v.number("turn_floor_rad", c.turn_floor, 0.0, 3.2);
   v.number("place_floor_m", c.place_floor, 0.0, 10.0);
   v.group("tracks", c.tracks);

@@ -70,6 +70,7 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
   ++counts_.used;
   counts_.nis_sum += squared;
   counts_.dof_sum += dof;
+  counts_.residual_sum += work.block(3, 3 + n, dof, 1).squaredNorm();
   const double weight = std::min(1.0, (tuning_.tails + dof) / (tuning_.tails + squared));  // (N.6.11)
   work.block(3, 3, dof, n + 1) *= std::sqrt(weight);
   push(work.block(3, 3, dof, n + 1));

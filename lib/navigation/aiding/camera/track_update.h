@@ -12,9 +12,10 @@ namespace roadfix::navigation {
 struct TrackCounts {
   int used = 0;
   int refused = 0;
-  int not_placed = 0;    ///< no triangulation
-  double nis_sum = 0.0;  ///< of used tracks, before their weight
-  int dof_sum = 0;       ///< likewise
+  int not_placed = 0;         ///< no triangulation
+  double nis_sum = 0.0;       ///< of used tracks, before their weight
+  int dof_sum = 0;            ///< likewise
+  double residual_sum = 0.0;  ///< likewise, squares of residuals in units of the tracks' noise
 
   [[nodiscard]] int tried() const { return used + refused; }
 };

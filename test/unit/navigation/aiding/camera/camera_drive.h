@@ -26,6 +26,7 @@ struct CameraOutcome {
   Eigen::Matrix<double, 9, 1> error = Eigen::Matrix<double, 9, 1>::Zero();  ///< (phi, nu, rho) about the end
   Eigen::Matrix<double, 9, 9> cov = Eigen::Matrix<double, 9, 9>::Zero();
   double lens_nees = 0.0;  ///< of the lens, which is exact
+  double turn_nees = 0.0;  ///< of the camera's mounting angles, where they are estimated
   int updates = 0, used = 0, refused = 0;
   double misfit = 0.0;  ///< at the end
   navigation::CameraFitness fitness = navigation::CameraFitness::kOnTrial;
@@ -145,6 +146,11 @@ inline CameraOutcome drive_by_camera(const TrackDrive& d, const CameraRun& run, 
   out.cov = filter.state().P().topLeftCorner<9, 9>();
   const Eigen::Vector3d lens = filter.state().x.lens;
   if (!run.two_eyes) out.lens_nees = lens.dot(filter.state().P().block<3, 3>(kLens, kLens).ldlt().solve(lens)) / 3.0;
+  if (run.camera_turn_std > 0.0) {
+    const Eigen::Matrix3d off = filter.state().x.T_imu_camera.R().transpose() * true_mean(d, end_us).T_imu_camera.R();
+    const Eigen::Vector3d turn = log_so3(off);
+    out.turn_nees = turn.dot(filter.state().P().block<3, 3>(kCameraTurn, kCameraTurn).ldlt().solve(turn)) / 3.0;
+  }
   out.fitness = camera.fitness();
   return out;
 }
