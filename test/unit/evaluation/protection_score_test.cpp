@@ -51,7 +51,7 @@ TEST_CASE("protection score: misleading in any axis, available within the limits
   CHECK(score->longest_misled_s == Approx(0.1));
 }
 
-TEST_CASE("protection score: the series has every sample with its error; levels of other risks are left out") {
+TEST_CASE("protection score: the series has every sample with its error, levels of other risks are left out") {
   std::vector<ProtectionSample> levels = {sample(0, 0.1, 0.2), sample(100'000, 0.1, kUnbounded),
                                           sample(200'000, 0.1, 0.2)};
   levels[2].risk = {1e-3};

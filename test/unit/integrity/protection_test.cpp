@@ -94,7 +94,7 @@ TEST_CASE("protection: errors as claimed are below their levels, and the levels 
   CHECK(samples.back().protection.level[kFrequent].y() < 0.2);
 }
 
-TEST_CASE("protection: errors of twice the claim, which innovations show, are still below; Gaussian tails are not") {
+TEST_CASE("protection: errors of twice the claim, which innovations show, are still below, Gaussian tails are not") {
   CarOptions options;
   options.claim = 0.5;
   options.innovation = 2.0;
@@ -118,7 +118,7 @@ TEST_CASE("protection: drawn away, it says within 10 s that the pose is of no us
   }
 }
 
-TEST_CASE("protection: displaced after an outage, the level holds until that is verified; trusted at once, not") {
+TEST_CASE("protection: displaced after an outage, the level holds until that is verified, trusted at once, not") {
   CHECK(misleading(displaced_return(), {}, kFrequent) <= 1e-3);
   IntegrityConfig hasty;
   hasty.coasting_after = 60.0;  // for no outage at all

@@ -60,7 +60,7 @@ TEST_CASE("separation: the witness's scale and turn are learnt, so that a slow d
   CHECK_FALSE(b.contradicted);
 }
 
-TEST_CASE("separation: a wheel scale learnt on a straight holds in a bend and in reverse; a drift is found there too") {
+TEST_CASE("separation: a wheel scale learnt on a straight holds in a bend and in reverse, a drift is found there too") {
   Beside b;
   b.scale = 1.03;
   b.go(59.0);

@@ -58,7 +58,7 @@ TEST_CASE("the page fits every terminal") {
   }
 }
 
-TEST_CASE("verdict in big letters where there is room, in words where there is none; reasons; figures") {
+TEST_CASE("verdict in big letters where there is room, in words where there is none, reasons, figures") {
   const std::string wide = render_screen(some_report(Verdict::kDoNotUse), {80, 40}, false);
   CHECK_THAT(wide, Catch::Contains("█▄▄▄▀"));
   CHECK_THAT(wide, Catch::Contains("reason number 5"));
