@@ -121,6 +121,8 @@ void add_paper_c(CLI::App& paper) {
   CLI::App* command = add_experiment(
       paper, "c", "Lee et al. (2025): tables 1 and 2, the fusion as printed, each part left out, and the default",
       experiment, options);
+  command->add_flag("--independent", options->drive.independent,
+                    "Vision hears nothing of the INS, as in the paper; the estimators are run again");
   command->add_flag("--again", options->drive.again, "Run the estimators although the drive has their poses");
   command
       ->add_option("--remove-slow-s", options->drive.slow_window,

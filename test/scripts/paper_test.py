@@ -110,6 +110,12 @@ class Paper(unittest.TestCase):
         rows = rows_of(slowless / "table_1.csv")
         self.assertLess(float(rows.pop("VIO, similarity, slower than 5 s removed")[0]), float(rows["VIO, similarity"][0]))
         self.assertEqual(rows, accuracy)
+        alone = self.folder / "alone"
+        done = roadfix("paper", "c", self.drive, "--config", VEHICLE, "--out", alone, "--independent")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = rows_of(alone / "table_1.csv")
+        self.assertEqual(rows["GNSS/INS"], accuracy["GNSS/INS"])
+        self.assertNotEqual(rows["VIO, similarity"], accuracy["VIO, similarity"])
         # Of poses that are recorded the same tables come out.
         poses = self.folder / "poses.lcm"
         stages = "gnss_ins_ekf,vo_tracker,wheel_odometry"

@@ -8,6 +8,7 @@
 
 #include "bus/log/log_reader.h"
 #include "bus/run/replay.h"
+#include "roadfix/paper/deaf_stage.h"
 #include "roadfix/stages.h"
 
 namespace roadfix {
@@ -63,13 +64,17 @@ std::filesystem::path with_poses_of(const std::vector<std::string>& stages, cons
   const bool recorded = std::all_of(stages.begin(), stages.end(), [&](const std::string& stage) {
     return there.contains(pose_makers().at(stage).pose);
   });
-  if (recorded && !request.again) return request.drive;
+  if (recorded && !request.again && !request.independent) return request.drive;
   for (const std::string& stage : stages) {
     const PoseMaker& maker = pose_makers().at(stage);
     require_channels(request.drive, there, maker.sensors, maker.pose + " is made from");
   }
   const std::filesystem::path out = scratch / "poses.lcm";
-  replay_for_paper(request.drive, out, make_stages(stages, request.vehicle), request.progress);
+  std::vector<std::unique_ptr<Stage>> made = make_stages(stages, request.vehicle);
+  for (std::unique_ptr<Stage>& stage : made) {
+    if (request.independent && stage->spec().name == "vo_tracker") stage = deaf_to("POSE_INS", std::move(stage));
+  }
+  replay_for_paper(request.drive, out, std::move(made), request.progress);
   return out;
 }
 

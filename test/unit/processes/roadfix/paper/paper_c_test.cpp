@@ -1,11 +1,14 @@
 #include "roadfix/paper/paper_c.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <set>
 
+#include "config/calibration.h"
 #include "geometry/frames.h"
 #include "paper_log.h"
 #include "roadfix/evaluate/evaluate_log.h"
+#include "roadfix/stages.h"
 #include "support/shared_data.h"
 #include "support/temporary_folder.h"
 
@@ -85,6 +88,23 @@ TEST_CASE("good vision carries the fusion through the outage; vision that turns 
   const PaperReport bad = tables_of(turning, folder);
   CHECK(value(bad.tables[0], "fusion, literal", 0) > 1.2 * value(good.tables[0], "fusion, literal", 0));
   CHECK(value(bad.tables[0], "GNSS/INS", 0) == value(good.tables[0], "GNSS/INS", 0));
+}
+
+TEST_CASE("configs/paper_c is the demo's vehicle with an EKF without a camera and an MSCKF without a receiver") {
+  const std::filesystem::path vehicle = test::source_path("configs/paper_c");
+  CHECK(calibration_text(load_calibration(vehicle)) ==
+        calibration_text(load_calibration(test::source_path("configs/demo"))));
+  const auto stages = make_stages({"gnss_ins_ekf", "vo_tracker"}, vehicle);
+  const auto reads = [&](std::size_t stage, const std::string& channel) {
+    const auto& inputs = stages.at(stage)->spec().inputs;
+    return std::any_of(inputs.begin(), inputs.end(), [&](const InputSpec& i) { return i.channel == channel; });
+  };
+  CHECK(reads(0, "GNSS"));
+  CHECK(!reads(0, "VO_FEATURES"));
+  CHECK(reads(1, "CAMERA_LEFT"));
+  CHECK(reads(1, "IMU"));
+  CHECK(!reads(1, "GNSS"));
+  CHECK(reads(1, "POSE_INS"));  // its start may take the INS's speed: --independent
 }
 
 TEST_CASE("a drive that lacks a channel is refused with its name") {
