@@ -30,7 +30,7 @@ TEST_CASE("a drift is removed but for the ends, and what is fast stays") {
   CHECK(std::abs(shorter[1025].y()) < 0.1 * std::abs(errors[1025].position_frame.y()) + 0.02);
 }
 
-TEST_CASE("figures of what is left; a hole in time makes a window of its own") {
+TEST_CASE("figures of what is left, a hole in time makes a window of its own") {
   auto errors = drift_and_wave();
   const auto figures = slowless_figures(errors, 20.0).value();
   CHECK(figures.ate_mean < 0.3);

@@ -114,7 +114,7 @@ TEST_CASE("most patches of an unrelated image are rejected") {
   CHECK(4 * found < tried);  // coarse texture leaves few degrees of freedom
 }
 
-TEST_CASE("patches stay within the image; flat and unrelated ones are rejected") {
+TEST_CASE("patches stay within the image, flat and unrelated ones are rejected") {
   const cv::Mat image = test::texture(64, 64, 3);
   CHECK_FALSE(extract_patch(image, {5.0F, 30.0F}, 11));
   CHECK_FALSE(extract_patch(image, {30.0F, 58.6F}, 11));

@@ -72,7 +72,7 @@ TEST_CASE("pairs of faults: what is left carries the pose, and nothing far off i
 }
 
 TEST_CASE(
-    "an INS that corrects itself by 30 m while no fix comes is not followed; with one it is, and it is announced") {
+    "an INS that corrects itself by 30 m while no fix comes is not followed, with one it is, and it is announced") {
   for (const bool fix : {false, true}) {
     Tunnel t;
     t.ins.velocity_walk = 0.005;

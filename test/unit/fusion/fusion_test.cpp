@@ -93,7 +93,7 @@ TEST_CASE("POSE_LOCAL never jumps, whatever the fixes do to the INS") {
   }
 }
 
-TEST_CASE("without GNSS POSE_FUSED is a pose in the local frame that says so; the first pose in ENU is announced") {
+TEST_CASE("without GNSS POSE_FUSED is a pose in the local frame that says so, the first pose in ENU is announced") {
   const Tunnel t;
   std::vector<StreamEvent> events = t.events();
   std::erase_if(events,
@@ -190,7 +190,7 @@ TEST_CASE("the order of samples of one time makes no difference that counts") {
   CHECK((of_a.T_frame_vehicle.p - of_b.T_frame_vehicle.p).norm() < 0.2);
 }
 
-TEST_CASE("a snapshot goes on with the same bits; shifted times change none") {
+TEST_CASE("a snapshot goes on with the same bits, shifted times change none") {
   const Tunnel t;
   const std::vector<StreamEvent> events = with(t.events(), t, {faults()[3]});
   Fusion whole({});

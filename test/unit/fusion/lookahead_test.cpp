@@ -18,7 +18,7 @@ ChannelSample at(double t_s, double off = 0.0) {
   return s;
 }
 
-TEST_CASE("motion ahead is that of the velocities, from where the fusion stands; corrections are apart") {
+TEST_CASE("motion ahead is that of the velocities, from where the fusion stands, corrections are apart") {
   Lookahead ahead;
   CHECK(!ahead.from(0));
   for (const double t : {0.0, 0.1, 0.2}) ahead.see(at(t));

@@ -60,7 +60,7 @@ TEST_CASE("what is over is forgotten after its time") {
   CHECK(alarms.reasons().empty());
 }
 
-TEST_CASE("the worst reason decides and comes first; a condition that gets worse counts at once") {
+TEST_CASE("the worst reason decides and comes first, a condition that gets worse counts at once") {
   Alarms alarms({0.1, 0.7});
   alarms.update(1 * kTenth, {kLate, kDead});
   alarms.update(2 * kTenth, {kLate, kDead});

@@ -29,7 +29,7 @@ TEST_CASE("the rate of a channel is that of its messages, and nought once it is 
   CHECK(monitor.report(test::at(9.0), 0).rate_hz == 0.0);
 }
 
-TEST_CASE("two processes under one name are told from a restart; monitors may look side by side") {
+TEST_CASE("two processes under one name are told from a restart, monitors may look side by side") {
   const auto reported = [](const std::string& process, int both) {
     Health health(HealthConfig{}, Expectations{});
     std::string all;

@@ -44,7 +44,7 @@ TEST_CASE("an invalid judged pose is not to be used, a coasting one is degraded"
   CHECK(coasting.health.verdict() == Verdict::kOk);
 }
 
-TEST_CASE("an estimate that is not judged and invalid degrades; one that never worked does nothing") {
+TEST_CASE("an estimate that is not judged and invalid degrades, one that never worked does nothing") {
   SmallCar car;
   const Change invalid = [](PoseFacts& f) { f.odometry.validity = Validity::kInvalid; };
   CHECK(reported(car, "POSE_INS", invalid, "pose.POSE_INS.invalid") > 0.0);
@@ -100,7 +100,7 @@ TEST_CASE("the ellipse has the axes of the covariance") {
   CHECK(std::abs(std::tan(e.direction)) == Approx(std::tan(0.3)));
 }
 
-TEST_CASE("a jump that nobody announced is not to be used; an announced one is told and degraded") {
+TEST_CASE("a jump that nobody announced is not to be used, an announced one is told and degraded") {
   for (const bool announced : {false, true}) {
     SmallCar car;
     car.pose = [=](const std::string& name, double t, PoseFacts& f) {
@@ -207,7 +207,7 @@ TEST_CASE("what is refused has no say in the mean of the innovations") {
   CHECK(report.ratio == Approx(1.5));
 }
 
-TEST_CASE("refusals are over once a source is used again, or has fallen silent; those that go on are not") {
+TEST_CASE("refusals are over once a source is used again, or has fallen silent, those that go on are not") {
   // 10 Hz, refused for 3 s; then accepted, silent, or refused every second time.
   const auto refused_until = [](const std::function<std::optional<bool>(int)>& later) {
     NisMonitor monitor("POSE_VO in FUSION", ConsistencyLimits{});
@@ -227,7 +227,7 @@ TEST_CASE("refusals are over once a source is used again, or has fallen silent; 
   CHECK(refused_until([](int i) { return i % 3 == 0; }) > 5.7);
 }
 
-TEST_CASE("refusals before a source's reset are not held against it; without a reset, or behind another's, they are") {
+TEST_CASE("refusals before a source's reset are not held against it, without a reset, or behind another's, they are") {
   const auto reported_until = [](const std::string& resets) {
     SmallCar car;
     car.tick = [&](double t) {
@@ -250,7 +250,7 @@ TEST_CASE("refusals before a source's reset are not held against it; without a r
   CHECK(reported_until("POSE_FUSED") > kMended + 0.8);
 }
 
-TEST_CASE("a source that fits again without being used is no longer told; one that errs now and then is") {
+TEST_CASE("a source that fits again without being used is no longer told, one that errs now and then is") {
   // 10 Hz, on probation: nothing is used, and every fifth contradicts the estimate, until `fits_from_s`.
   const auto reported_until = [](double fits_from_s) {
     NisMonitor monitor("POSE_VO in FUSION", ConsistencyLimits{});

@@ -157,7 +157,7 @@ TEST_CASE("channels that were forged for a moment do not set the time of the oth
   CHECK(car.health.verdict() == Verdict::kOk);
 }
 
-TEST_CASE("a frozen sensor repeats itself; a sensor that differs does not") {
+TEST_CASE("a frozen sensor repeats itself, a sensor that differs does not") {
   SmallCar car;
   car.arrival = [](const std::string& channel, double t, Arrival& a) {
     if (channel == "IMU" && faulty(t)) a.content = 7;
@@ -205,7 +205,7 @@ TEST_CASE("a dead process is told by its silence, a stopped one by its word") {
   CHECK(reported < kFault + 2.0);  // it beats once a second, the last time at 9 s
 }
 
-TEST_CASE("a process that beats fast is missed soon, a slow one later; a restart is told") {
+TEST_CASE("a process that beats fast is missed soon, a slow one later, a restart is told") {
   for (const int64_t period_us : {250'000, 1'000'000}) {
     ProcessMonitor monitor("recorder", ProcessLimits{});
     const auto reported = [&](int64_t now_us) {
@@ -268,7 +268,7 @@ TEST_CASE("what a heartbeat says of its process: state, processor, memory, queue
         }) == "process.imm_fusion.degraded: imm_fusion says: the network did not take 7 messages\n");
 }
 
-TEST_CASE("what spoke only once, as a forger does, is not missed for good; what is expected is") {
+TEST_CASE("what spoke only once, as a forger does, is not missed for good, what is expected is") {
   for (const bool expected : {false, true}) {
     ProcessMonitor monitor("vo_tracker", ProcessLimits{}, expected);
     for (const double t : {0.0, 0.01, 0.02, 0.03}) monitor.heartbeat(test::at(t), {});
@@ -336,7 +336,7 @@ TEST_CASE("measurements refused one and all are told before they are most of the
   }
 }
 
-TEST_CASE("what is expected and never comes is named; unexpected absence is not") {
+TEST_CASE("what is expected and never comes is named, unexpected absence is not") {
   Expectations expectations;
   expectations.channels = {{"CAMERA_LEFT", 20.0}};
   expectations.processes = {"vo_tracker"};

@@ -201,7 +201,7 @@ Driven with_clock(double late, double time_offset_std) {
   return r;
 }
 
-TEST_CASE("the doubt of a clock that nothing is told of bears 30 ms, costs nothing of an exact one; none does not") {
+TEST_CASE("the doubt of a clock that nothing is told of bears 30 ms, costs nothing of an exact one, none does not") {
   const Driven late = with_clock(0.03, kSilentClockStd), exact = with_clock(0.0, kSilentClockStd);
   const Driven sure = with_clock(0.0, 0.0), wrong = with_clock(0.03, 0.0);
   CHECK(late.nees < 1.7);

@@ -19,7 +19,7 @@ Eigen::VectorXd numbers(const Navigation& filter) {
 
 }  // namespace
 
-TEST_CASE("without an imu wheels and a yaw rate make fixes better, honestly; a wrong yaw rate does not") {
+TEST_CASE("without an imu wheels and a yaw rate make fixes better, honestly, a wrong yaw rate does not") {
   double ratio = 0.0, wrong = 0.0, inside = 0.0;
   constexpr unsigned kSeeds = 4;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
@@ -40,7 +40,7 @@ TEST_CASE("without an imu wheels and a yaw rate make fixes better, honestly; a w
   CHECK(wrong > 1.0);
 }
 
-TEST_CASE("wheels without a yaw rate, or time alone, do not begin without an imu; four speeds do") {
+TEST_CASE("wheels without a yaw rate, or time alone, do not begin without an imu, four speeds do") {
   const SimulatedDrive drive = small_car(1);
   Navigation filter(config_of(drive));
   WheelSample speed = drive.wheels.front();

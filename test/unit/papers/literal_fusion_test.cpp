@@ -70,7 +70,7 @@ TEST_CASE("each switch of the ablation changes the result") {
   CHECK(differs([](LiteralConfig& c) { c.one_model = true; }));
 }
 
-TEST_CASE("the gate recovers after it has refused for long; without that it never does") {
+TEST_CASE("the gate recovers after it has refused for long, without that it never does") {
   Tunnel t;
   t.ins.outages.clear();
   t.vo.fault = [](double t_s, Planar& motion) {

@@ -93,7 +93,7 @@ Outcome run(const Path3d& path, double noise) {
   return o;
 }
 
-TEST_CASE("Kim and Kang on KITTI: literally nothing changes; a motion model takes noise away and leaves the drift") {
+TEST_CASE("Kim and Kang on KITTI: literally nothing changes, a motion model takes noise away and leaves the drift") {
   const auto folder = test::shared_path("data/trajectories");
   if (!folder) return;
   for (const auto& [drive, odometry] : {std::pair("kitti_00", "orb_slam"), std::pair("kitti_06", "so_dso_keyframes")}) {

@@ -50,7 +50,7 @@ TEST_CASE("the scale drift covariance is consistent with the position error") {
   CHECK(nees_quarter > 3.0);  // teeth
 }
 
-TEST_CASE("a transformed map has the same error in its new axes; one with a new start has none") {
+TEST_CASE("a transformed map has the same error in its new axes, one with a new start has none") {
   const Eigen::Vector3d lever(0.0, 1.5, -1.6);
   ConsideredScales error, moved;
   const SE3 turn{exp_q({0.1, 0.7, -0.2}), {3.0, 0.0, 1.0}};

@@ -154,7 +154,7 @@ TEST_CASE("the covariance of the pose solver is consistent") {
   CHECK(mean_nees(0.5, 0.5) > 1.5);  // teeth
 }
 
-TEST_CASE("two views give the motion; pure rotation is rejected") {
+TEST_CASE("two views give the motion, pure rotation is rejected") {
   Rng random(11);
   const SE3 T_first_second{exp_q({0.01, 0.03, -0.01}), Eigen::Vector3d(0.3, 0.1, 1.0).normalized()};
   std::vector<Eigen::Vector2d> first, second, turned;

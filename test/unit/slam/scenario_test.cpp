@@ -220,7 +220,7 @@ Dark into_the_dark(const ScenarioConfig& config, double light_s) {
   return dark;
 }
 
-TEST_CASE("a dark tunnel ends in lost within 0.5 s; a restart in the light takes the given pose") {
+TEST_CASE("a dark tunnel ends in lost within 0.5 s, a restart in the light takes the given pose") {
   ScenarioConfig config = shortened("tunnel_dark", 50.0);
   config.scene.segments = {{0.0, StreetKind::kStreet}, {15.0, StreetKind::kTunnelDark}, {30.0, StreetKind::kStreet}};
   const Dark dark = into_the_dark(config, 34.0);

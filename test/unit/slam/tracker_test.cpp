@@ -191,7 +191,7 @@ TEST_CASE("bad images are handled and named") {
   CHECK(run.tracker.last().reset_counter == 0);
 }
 
-TEST_CASE("a frozen image counts as standstill; what follows is right or a counted jump") {
+TEST_CASE("a frozen image counts as standstill, what follows is right or a counted jump") {
   Run run(true);
   for (int i = 0; i < kFrames; ++i) {
     CameraFrame frame = drive()[static_cast<size_t>(i)];
@@ -208,7 +208,7 @@ TEST_CASE("a frozen image counts as standstill; what follows is right or a count
   CHECK((error.head<3>().norm() < 0.02 * 0.8 * kFrames || last.reset_counter > 0));
 }
 
-TEST_CASE("darkness ends in lost within 0.5 s; a restart takes the given pose") {
+TEST_CASE("darkness ends in lost within 0.5 s, a restart takes the given pose") {
   Run run(true);
   const cv::Mat black = cv::Mat::zeros(kLens.height, kLens.width, CV_8UC1);
   for (int i = 0; i < 20; ++i) {

@@ -85,7 +85,7 @@ TEST_CASE("an input behind the horizon is late and in the ledger with the next t
   REQUIRE(late[0].utime == 50);
 }
 
-TEST_CASE("a gap is a loss; a later arrival is late, an earlier one a duplicate") {
+TEST_CASE("a gap is a loss, a later arrival is late, an earlier one a duplicate") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   offer(stream, kSlow, 60, 1);
@@ -123,7 +123,7 @@ TEST_CASE("stamps that ran ahead and return late: waiting inputs are not lost") 
   REQUIRE(stream.track(kSlow).counters.lost == 2);
 }
 
-TEST_CASE("a gap in the clock is a loss at once; late samples are late") {
+TEST_CASE("a gap in the clock is a loss at once, late samples are late") {
   InputStream stream = make_stream();
   tick_until(stream, 50);
   REQUIRE(offer(stream, kClock, 80, 8) == Offer::kTick);
@@ -136,7 +136,7 @@ TEST_CASE("a gap in the clock is a loss at once; late samples are late") {
   REQUIRE(stream.track(kClock).counters.lost == 2);  // not counted again when the horizon comes by
 }
 
-TEST_CASE("each run is recorded; an older one that continues beside it is refused") {
+TEST_CASE("each run is recorded, an older one that continues beside it is refused") {
   InputStream stream = make_stream();
   tick_until(stream, 100);
   offer(stream, kSlow, 60, 40, nullptr, 1);
@@ -174,7 +174,7 @@ TEST_CASE("a looped log with shifted stamps is refused and reported, not taken f
   REQUIRE(stream.track(kClock).counters.conflicts == 5);
 }
 
-TEST_CASE("feedback takes effect after its delay; a later one is unused and in the ledger") {
+TEST_CASE("feedback takes effect after its delay, a later one is unused and in the ledger") {
   InputStream stream = make_stream();
   std::vector<Applied> applied;
   tick_until(stream, 50);

@@ -34,7 +34,7 @@ double quarter_error(int steps, StepForm form) {
   return (p - Eigen::Vector3d(20.0, 20.0, 0.0)).norm();
 }
 
-TEST_CASE("arc integration is exact on a circle; Euler integration has a first-order error") {
+TEST_CASE("arc integration is exact on a circle, Euler integration has a first-order error") {
   CHECK(closing_error(7, StepForm::kArc) < 1e-10);
   CHECK(quarter_error(3, StepForm::kArc) < 1e-10);
   CHECK(quarter_error(100, StepForm::kEuler) > 0.1);

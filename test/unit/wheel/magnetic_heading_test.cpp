@@ -38,7 +38,7 @@ Worst worst_over_headings(double roll, double pitch) {
   return worst;
 }
 
-TEST_CASE("the printed heading of Ock et al. errs by 7, 16 and 23 deg; the corrected form by none") {
+TEST_CASE("the printed heading of Ock et al. errs by 7, 16 and 23 deg, the corrected form by none") {
   const double tilt = 5.0 * kDegree;
   const Worst rolled = worst_over_headings(tilt, 0.0);
   const Worst pitched = worst_over_headings(0.0, -tilt);

@@ -49,7 +49,7 @@ TEST_CASE("Jacobian of the propagation in all its forms") {
   }
 }
 
-TEST_CASE("biases follow their own random walks; scales and mounting angles are constant") {
+TEST_CASE("biases follow their own random walks, scales and mounting angles are constant") {
   WheelNoise noise;
   noise.gyro_walk = 1e-3;
   noise.accel_walk = 2e-2;
@@ -102,7 +102,7 @@ TEST_CASE("speed noise without an accelerometer equals integrated white noise") 
   CHECK(state.P(kPos, kPos) == Approx(4.0 / 3.0));
 }
 
-TEST_CASE("a Schmidt update leaves considered states unchanged; its covariance equals Joseph's form") {
+TEST_CASE("a Schmidt update leaves considered states unchanged, its covariance equals Joseph's form") {
   std::mt19937_64 generator(43);
   WheelCovariance A;
   for (int i = 0; i < kWheelStates * kWheelStates; ++i) A(i) = draw(generator, 0.1);

@@ -60,7 +60,7 @@ TEST_CASE("ideal sensors: position error below 0.1 % of the distance") {
   }
 }
 
-TEST_CASE("uncorrected accelerometer angles tilt under braking; corrected ones do not") {
+TEST_CASE("uncorrected accelerometer angles tilt under braking, corrected ones do not") {
   const ScenarioConfig s = perfect(scenario_of("city_loop", 90.0));
   const SimulatedDrive drive = simulate(s, 1);
   const auto rms_pitch = [&](bool correct) {
@@ -287,7 +287,7 @@ TEST_CASE("a restored snapshot continues with the same bits") {
   CHECK(resumed.state().P == whole.state().P);
 }
 
-TEST_CASE("a start in motion uses the gyro bias of the last drive; after the start it has no effect") {
+TEST_CASE("a start in motion uses the gyro bias of the last drive, after the start it has no effect") {
   double with = 0.0, without = 0.0;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const ScenarioConfig s = scenario_of("city_loop", 100.0);

@@ -9,3 +9,4 @@ class Twice {
   double b;
 };
 }  // namespace roadfix
+TEST_CASE("half a name; the other half") {}

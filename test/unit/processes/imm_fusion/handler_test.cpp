@@ -124,7 +124,7 @@ TEST_CASE("a pose for now is the later pose of the horizon, but for what the cha
   CHECK(largest < 0.35);
 }
 
-TEST_CASE("late messages give the same bits; beyond the lateness they are refused, and that shows") {
+TEST_CASE("late messages give the same bits, beyond the lateness they are refused, and that shows") {
   const Caught in_order = run(arrivals(everything));
   const Caught late = run(arrivals(everything, 45'000));
   for (const auto& [channel, messages] : in_order.messages) {
@@ -196,7 +196,7 @@ TEST_CASE("the paper's scheme is selectable: POSE_FUSED is its pose, and a snaps
   CHECK(std::equal(again.begin(), again.end(), all.end() - static_cast<std::ptrdiff_t>(again.size())));
 }
 
-TEST_CASE("without GNSS the fused pose is in a local frame and usable; darkness brings a restart at the carried pose") {
+TEST_CASE("without GNSS the fused pose is in a local frame and usable, darkness brings a restart at the carried pose") {
   const Caught out = run([] {
     Wire wire;
     for (StreamEvent e : events()) {

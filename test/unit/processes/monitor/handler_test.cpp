@@ -91,7 +91,7 @@ TEST_CASE("a flood of forged channel names fills no memory") {
   CHECK(bench.handler.health().report().channels.size() == 256);
 }
 
-TEST_CASE("heartbeats name the process; the queue that waits longest is its queue") {
+TEST_CASE("heartbeats name the process, the queue that waits longest is its queue") {
   heartbeat_t m{};
   m.state = heartbeat_t::STATE_NO_CLOCK;
   m.input_channel = {"IMU", "GNSS"};

@@ -92,7 +92,7 @@ TEST_CASE("without the estimates the drive is not to be used") {
   CHECK(share(reports, 0.0, 90.0, Verdict::kDoNotUse) == 1.0);
 }
 
-TEST_CASE("logs are merged by time; one recorded while it was played is put back") {
+TEST_CASE("logs are merged by time, one recorded while it was played is put back") {
   const test::TemporaryFolder folder;
   constexpr int64_t kStart_us = 1'700'000'000'000'000;
   const auto write = [&](const char* name, int64_t offset_us, int64_t late_us) {

@@ -122,7 +122,7 @@ TEST_CASE("a snapshot restored mid-drive continues with the same bits") {
   CHECK_THROWS(resumed->load(std::vector<uint8_t>{1, 2, 3}));
 }
 
-TEST_CASE("calibration values reach the odometry; missing ones keep the default") {
+TEST_CASE("calibration values reach the odometry, missing ones keep the default") {
   Calibration c = calibration();
   c.sensors.imu = ImuCalibration{};
   c.sensors.imu->gyro_noise = 7e-4;

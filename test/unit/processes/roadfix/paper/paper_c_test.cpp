@@ -74,7 +74,7 @@ TEST_CASE("the printed fusion is what imm_fusion does with its scheme, and each 
   CHECK(report.intervals[0].second == Approx(35.0));
 }
 
-TEST_CASE("good vision carries the fusion through the outage; vision that turns by itself does not") {
+TEST_CASE("good vision carries the fusion through the outage, vision that turns by itself does not") {
   const TemporaryFolder folder;
   PaperLog poor;  // poses of one filter count as independent ones, so that a poor INS still has most of the weight
   poor.ins.velocity_walk = 0.3;

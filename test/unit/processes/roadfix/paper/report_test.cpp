@@ -21,7 +21,7 @@ PaperReport small_report() {
   return report;
 }
 
-TEST_CASE("a table as text and as CSV; what is not there is said") {
+TEST_CASE("a table as text and as CSV, what is not there is said") {
   const PaperReport report = small_report();
   CHECK(paper_csv(report.tables[0]) == "estimate,ATE m\n\"one, \"\"two\"\"\",0.25\nnone,\n");
   const std::string text = paper_text(report);
