@@ -13,6 +13,13 @@ namespace {
 constexpr double kMotionTime = 0.05;  // s
 constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
 
+// How long a receiver takes to settle after it has lost all signals is nobody's promise: its loops pull in within a
+// second, its smoothing of codes by carriers (Hatch 1982) and its own filter within some. Prior: 0.75 to 8 s at one
+// standard deviation, and ten seconds later it may be another by a factor of 2.6.
+constexpr double kFadeTime = 2.5;    // s
+constexpr double kFadeSpread = 1.2;  // of the logarithm
+constexpr double kFadeWalk = 0.3;    // of the logarithm, 1/sqrt(s)
+
 double square(double x) { return x * x; }
 
 // How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they
@@ -83,6 +90,7 @@ void Filter::predict(const ImuSample& imu, double dt, const inertial::ImuNoise& 
   integrate(x, last_, motion_, earth_, imu, dt);
   for (int i = 0; i < 3; ++i) x.gnss_bias(i) *= inertial::gauss_markov_decay(dt, gnss_bias_.position_time(i));
   x.gnss_velocity_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.velocity_time);
+  if (returning()) x.gnss_return *= std::exp(-dt * std::exp(x.return_rate));
   if (sums_.duration() >= config_.process.covariance_interval - 1e-9) flush();
 }
 
@@ -122,7 +130,15 @@ Filter::Diagonal Filter::diagonal(double T) const {
   }
   d.decay.segment<3>(kGnssVelocityBias).setConstant(velocity_decay);
   d.noise.segment<3>(kGnssVelocityBias) = (1.0 - square(velocity_decay)) * gnss_bias_.velocity_std.cwiseAbs2();
+  if (returning()) {
+    d.decay.segment<3>(kGnssReturn).setConstant(std::exp(-T * std::exp(state_.x.return_rate)));
+    d.noise(kReturnRate) = square(kFadeWalk) * T;
+  }
   return d;
+}
+
+Eigen::Vector3d Filter::by_return_rate(double T) const {
+  return -T * std::exp(state_.x.return_rate) * state_.x.gnss_return;
 }
 
 void Filter::flush() {
@@ -147,10 +163,19 @@ void Filter::flush() {
   own.noalias() += rows.leftCols<kInertialSize>().lazyProduct(step.F.transpose());
   const Diagonal d = diagonal(T);
   if (state_.held()) state_.expected().head<9>() = (step.F * state_.expected().head<kInertialSize>()).eval();
-  for (int k = kGnssBias; k < kGnssBias + 6; ++k) {  // the only states that decay
+  for (int k = kGnssBias; k < kReturnRate; ++k) {  // the only states that decay
     P.row(k).head(n) *= d.decay(k);
     P.col(k).head(n) *= d.decay(k);
     rows.col(k) *= d.decay(k);
+  }
+  if (returning()) {
+    const Eigen::Vector3d by_rate = by_return_rate(T);
+    for (int i = 0; i < 3; ++i) {
+      rows.col(kGnssReturn + i) += by_rate(i) * rows.col(kReturnRate);
+      P.row(kGnssReturn + i).head(n) += by_rate(i) * P.row(kReturnRate).head(n);
+    }
+    for (int i = 0; i < 3; ++i) P.col(kGnssReturn + i).head(n) += by_rate(i) * P.col(kReturnRate).head(n);
+    for (int i = 0; i < 3; ++i) P.row(kGnssReturn + i).head(n) = P.col(kGnssReturn + i).head(n).transpose();
   }
   P.topLeftCorner<9, 9>() = 0.5 * (own + own.transpose());
   P.block(0, 9, 9, n - 9) = rows.rightCols(n - 9);
@@ -167,6 +192,7 @@ Eigen::Matrix<double, Rows, kWithoutCamera> Filter::at_epoch(const Measurement<R
   H.template leftCols<9>().setZero();
   H = H * diagonal(T).decay.asDiagonal();
   H.template leftCols<kInertialSize>() += m.H.template leftCols<9>() * transition().F;
+  if (returning()) H.col(kReturnRate) += m.H.template middleCols<3>(kGnssReturn) * by_return_rate(T);
   return H;
 }
 
@@ -275,6 +301,26 @@ void Filter::reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vect
   P.diagonal().segment<3>(at) = std.cwiseAbs2();
   if (at == kGnssBias) state_.x.gnss_bias = value;
   if (at == kGnssVelocityBias) state_.x.gnss_velocity_bias = value;
+}
+
+void Filter::begin_return(const Eigen::Vector3d& std) {
+  end_return();
+  state_.x.return_rate = -std::log(kFadeTime);
+  state_.P().diagonal().segment<4>(kGnssReturn) << std.cwiseAbs2(), square(kFadeSpread);
+}
+
+void Filter::end_return() {
+  flush();
+  const int n = state_.size();
+  state_.P().middleRows<4>(kGnssReturn).leftCols(n).setZero();
+  state_.P().middleCols<4>(kGnssReturn).topRows(n).setZero();
+  state_.x.gnss_return.setZero();
+  state_.x.return_rate = 0.0;
+}
+
+double Filter::return_size() const {
+  const Eigen::Vector2d variance = state_.P().diagonal().segment<2>(kGnssReturn);
+  return std::sqrt((state_.x.gnss_return.head<2>().cwiseAbs2() + variance).maxCoeff());
 }
 
 void Filter::rescale_gnss_bias(int at, double ratio) {

@@ -61,8 +61,15 @@ class Filter {
   [[nodiscard]] const GnssBias& gnss_bias() const { return gnss_bias_; }
   /// The block's value and covariance become this, without correlation with anything else.
   void reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vector3d& std);
-  /// The prior variance of the receiver's error at kGnssBias or kGnssVelocityBias becomes `ratio` times what it was, (N.5.11): as if it had been
-  /// measured as zero, or such a measurement were taken back.
+  /// The receiver comes back from an outage with an error of this standard deviation (m, level axes) that fades at a rate
+  /// nobody knows, (N.5.2).
+  void begin_return(const Eigen::Vector3d& std);
+  void end_return();
+  [[nodiscard]] bool returning() const { return state_.P()(kReturnRate, kReturnRate) > 0.0; }
+  /// m, root mean square of what may be left of it: the largest of the level axes.
+  [[nodiscard]] double return_size() const;
+  /// The prior variance of the receiver's error at kGnssBias or kGnssVelocityBias becomes `ratio` times what it was,
+  /// (N.5.11): as if it had been measured as zero, or such a measurement were taken back.
   void rescale_gnss_bias(int at, double ratio);
   /// P += d d' over the base block.
   void widen(const BaseVector& d);
@@ -99,6 +106,8 @@ class Filter {
   void digest(Digest& digest) const { state_.digest(digest); }
 
  private:
+  /// d (what a receiver brought back) over T s by the logarithm of its rate.
+  [[nodiscard]] Eigen::Vector3d by_return_rate(double T) const;
   /// What a covariance step does to the base block's states that no other moves: decay and added variance.
   struct Diagonal {
     Eigen::Matrix<double, kWithoutCamera, 1> decay, noise;

@@ -220,9 +220,12 @@ void Navigation::step(const ImuSample& imu) {
   } else {
     phase_ = alignment_.has_fix() ? Phase::kLevelling : Phase::kWaiting;
     if (!block_done || imu_noise_.frozen()) return;
-    const Eigen::Vector3d bias =
-        alignment_.has_fix() ? aiding_.gnss_position().lasting_std(*alignment_.fix()) : Eigen::Vector3d::Zero();
-    if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias)) return;
+    Eigen::Vector3d bias = Eigen::Vector3d::Zero(), back = Eigen::Vector3d::Zero();
+    if (alignment_.has_fix()) {
+      bias = aiding_.gnss_position().lasting_std(*alignment_.fix());
+      back = aiding_.gnss_position().return_std(*alignment_.fix());
+    }
+    if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias, back)) return;
     // What is older made the start, or lies too far back to be carried over an unknown acceleration.
     forget_before(imu.t_us + 1);
     predictor_stale_ = true;

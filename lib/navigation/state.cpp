@@ -30,6 +30,8 @@ void retract_base(Mean& x, const Eigen::Ref<const Eigen::VectorXd>& d, const Eig
   x.wheel_latency += d(kWheelLatency);
   x.gnss_bias += part(d, kGnssBias);
   x.gnss_velocity_bias += part(d, kGnssVelocityBias);
+  x.gnss_return += part(d, kGnssReturn);
+  x.return_rate += d(kReturnRate);
   if (!camera) return;
   x.T_imu_camera.q = (x.T_imu_camera.q * exp_q(part(d, kCameraTurn))).normalized();
   x.T_imu_camera.p += part(d, kCameraPlace);
@@ -74,6 +76,8 @@ BaseVector local(const Mean& x, const Mean& y, const Eigen::Vector3d& p_ref) {
   d(kWheelLatency) = y.wheel_latency - x.wheel_latency;
   d.segment<3>(kGnssBias) = y.gnss_bias - x.gnss_bias;
   d.segment<3>(kGnssVelocityBias) = y.gnss_velocity_bias - x.gnss_velocity_bias;
+  d.segment<3>(kGnssReturn) = y.gnss_return - x.gnss_return;
+  d(kReturnRate) = y.return_rate - x.return_rate;
   d.segment<3>(kCameraTurn) = log_q(x.T_imu_camera.q.conjugate() * y.T_imu_camera.q);
   d.segment<3>(kCameraPlace) = y.T_imu_camera.p - x.T_imu_camera.p;
   d.segment<3>(kRightTurn) = log_q(x.T_left_right.q.conjugate() * y.T_left_right.q);

@@ -39,13 +39,15 @@ inline constexpr int kImuOffset = 32;         ///< s, imu stamp minus true time
 inline constexpr int kWheelLatency = 33;      ///< s, age of a wheel speed at its stamp
 inline constexpr int kGnssBias = 34;          ///< m, Gauss-Markov error of GNSS positions, level axes
 inline constexpr int kGnssVelocityBias = 37;  ///< m/s, likewise of GNSS velocities
-inline constexpr int kWithoutCamera = 40;
-inline constexpr int kCameraTurn = 40;    ///< rad, of the left camera in the imu, camera axes
-inline constexpr int kCameraPlace = 43;   ///< m, imu axes
-inline constexpr int kLens = 46;          ///< of the left camera, (N.6.9)
-inline constexpr int kRightTurn = 49;     ///< rad, of the right camera against the left one, right camera's axes
-inline constexpr int kCameraOffset = 52;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
-inline constexpr int kBaseSize = 53;
+inline constexpr int kGnssReturn = 40;        ///< m, what a receiver brought back from an outage, level axes
+inline constexpr int kReturnRate = 43;        ///< of the logarithm of its rate
+inline constexpr int kWithoutCamera = 44;
+inline constexpr int kCameraTurn = 44;    ///< rad, of the left camera in the imu, camera axes
+inline constexpr int kCameraPlace = 47;   ///< m, imu axes
+inline constexpr int kLens = 50;          ///< of the left camera, (N.6.9)
+inline constexpr int kRightTurn = 53;     ///< rad, of the right camera against the left one, right camera's axes
+inline constexpr int kCameraOffset = 56;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
+inline constexpr int kBaseSize = 57;
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxPoints;
 
 using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
@@ -64,6 +66,8 @@ struct Mean {
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();
   double position_latency = 0.0, velocity_latency = 0.0, imu_offset = 0.0, wheel_latency = 0.0;
   Eigen::Vector3d gnss_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gnss_return = Eigen::Vector3d::Zero();
+  double return_rate = 0.0;  ///< logarithm of 1/s
   Eigen::Vector3d gnss_velocity_bias = Eigen::Vector3d::Zero();
   SE3 T_imu_camera;
   SE3 T_left_right;  ///< right camera's coordinates to the left one's; the place is exact
@@ -79,8 +83,8 @@ struct Mean {
   void serialise(Archive& a) {
     a(t_us, nav.q_level_imu.coeffs(), nav.velocity, nav.position, gyro_bias, accel_bias, gyro_scale, accel_scale,
       wheel_scale, mounting, p_imu_axle, p_imu_antenna, position_latency, velocity_latency, imu_offset, wheel_latency,
-      gnss_bias, gnss_velocity_bias, T_imu_camera.q.coeffs(), T_imu_camera.p, T_left_right.q.coeffs(), T_left_right.p,
-      lens, camera_offset);
+      gnss_bias, gnss_velocity_bias, gnss_return, return_rate, T_imu_camera.q.coeffs(), T_imu_camera.p,
+      T_left_right.q.coeffs(), T_left_right.p, lens, camera_offset);
   }
 };
 

@@ -32,7 +32,7 @@ void Alignment::add(const GnssFix& fix) {
 }
 
 bool Alignment::try_start(int64_t t_us, const inertial::StandstillDetector& standstill, std::optional<Geodetic>& anchor,
-                          const Eigen::Vector3d& bias_std) {
+                          const Eigen::Vector3d& bias_std, const Eigen::Vector3d& return_std) {
   const StartWithFixes with_fixes;
   const StartParked parked;
   const std::array<const StartStrategy*, 2> strategies = {&with_fixes, &parked};
@@ -53,6 +53,7 @@ bool Alignment::try_start(int64_t t_us, const inertial::StandstillDetector& stan
     parked_ = strategy == &parked;
     if (parked_) anchor = memory_->place;
     start->bias_std = bias_std;
+    start->return_std = return_std;
     hypotheses_.start(earth_of(config_, anchor), *start);
     return true;
   }

@@ -21,7 +21,7 @@ class Alignment {
   void add(const GnssFix& fix);
   /// At the end of a block; true: it has started, and everything stamped before begun_us() is used.
   bool try_start(int64_t t_us, const inertial::StandstillDetector& standstill, std::optional<Geodetic>& anchor,
-                 const Eigen::Vector3d& bias_std);
+                 const Eigen::Vector3d& bias_std, const Eigen::Vector3d& return_std);
   [[nodiscard]] HeadingHypotheses& hypotheses() { return hypotheses_; }
   [[nodiscard]] const HeadingHypotheses& hypotheses() const { return hypotheses_; }
   [[nodiscard]] bool has_fix() const { return fix_.has_value(); }

@@ -105,6 +105,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   // Delays show through velocity and acceleration, whose direction is not known yet.
   filter.consider(kPositionLatency, 4);
   filter.initialise(x, sigmas);
+  if (s.return_std.x() > 0.0) filter.begin_return(s.return_std);
   // Using what the mean came from as measurements gives every correlation: tilt with accelerometer bias, position with
   // attitude through the lever arm, velocity in level axes with the heading.
   const double open = Gates::open().nis[3];

@@ -21,8 +21,9 @@ struct StartState {
   double accel_std = 1.0;                             ///< m/s2, how far the mean may be from gravity
   Eigen::Vector3d antenna = Eigen::Vector3d::Zero();  ///< m, enu
   Eigen::Matrix3d antenna_cov = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d bias_std = Eigen::Vector3d::Zero();  ///< m, of the receiver's Gauss-Markov error in `antenna`
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, enu
+  Eigen::Vector3d bias_std = Eigen::Vector3d::Zero();    ///< m, of the receiver's Gauss-Markov error in `antenna`
+  Eigen::Vector3d return_std = Eigen::Vector3d::Zero();  ///< m, likewise of what it brought back from an outage
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    ///< m/s, enu
   double velocity_std = 1.0;
   std::optional<double> yaw;  ///< rad, imu, where a sensor measures it
   double yaw_std = 0.0;

@@ -86,6 +86,13 @@ TEST_CASE("NEES and NIS of fifty drives are consistent") {
   CHECK(o.inside >= 0.99 * o.scored);
 }
 
+TEST_CASE("NEES is consistent without the non-holonomic constraint across as well") {
+  const Outcome o = drive_all(1.0, [](NavigationConfig& c) { c.aiding.lateral_interval = 99.0; });
+  print("without the constraint", o);
+  CHECK(all(o) > 0.84);
+  CHECK(all(o) < 1.18);
+}
+
 TEST_CASE("noise one and a half times as large stays within three sigma") {
   const Outcome o = drive_all(1.5, [](NavigationConfig&) {});
   print("noise x 1.5", o);

@@ -38,6 +38,8 @@ class RandomNavigationState {
     x.wheel_latency = 0.04;
     x.gnss_bias = vector(1.0);
     x.gnss_velocity_bias = vector(0.1);
+    x.gnss_return = vector(1.0);
+    x.return_rate = number(0.5);
     x.T_imu_camera = {exp_q(vector(1.0)), vector(1.0)};
     x.T_left_right = {exp_q(vector(0.1)), {0.5, 0.0, 0.0}};
     x.lens = vector(0.01);

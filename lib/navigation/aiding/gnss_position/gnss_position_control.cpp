@@ -20,6 +20,7 @@ constexpr double kLeastDrift = 0.01;   // m/sqrt(s)
 // m: how far off a receiver without a fixed phase may come back from an outage, level and up; how far off a displaced one
 // typically is.
 constexpr double kReturnLevel = 3.0, kReturnUp = 6.0;
+constexpr double kSettled = 0.1;  // of a fix's sigma: less is over
 constexpr double kDisplacement = 5.0;
 constexpr double kDisplacedPrior = 0.01;    // of a run of rejected fixes
 constexpr double kDisplacedWalk = 0.5;      // m/sqrt(s), of a displacement
@@ -41,10 +42,15 @@ double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
 Eigen::Vector2d off_way(const Filter& filter, const Queued& fix) {
   const State& s = filter.state();
   const Measurement<3> m = gnss_position(s, filter.motion(), fix.value, fix.cov, fix.ahead(s.x));
-  return (m.residual + s.x.gnss_bias).head<2>();
+  return (m.residual + s.x.gnss_bias + s.x.gnss_return).head<2>();
 }
 
-Eigen::Vector3d return_variance() { return Eigen::Vector3d(kReturnLevel, kReturnLevel, kReturnUp).cwiseAbs2(); }
+/// What a receiver brought back has faded.
+void settle(Filter& filter, const Queued& fix) {
+  if (filter.returning() && filter.return_size() < kSettled * std::sqrt(fix.cov(0, 0))) filter.end_return();
+}
+
+const Eigen::Vector3d kReturn(kReturnLevel, kReturnLevel, kReturnUp);
 
 }  // namespace
 
@@ -60,8 +66,11 @@ LastingError GnssPositionControl::lasting(FixType type) const {
 Eigen::Vector3d GnssPositionControl::lasting_std(const GnssFix& fix) const {
   const Receiver& r = receiver(fix.fix_type);
   Eigen::Vector3d variance = lasting(fix.fix_type).share * r.scale.variance_factor() * fix.cov_enu.diagonal();
-  if (returns(fix.t_us, fix.fix_type)) variance += return_variance();
   return variance.cwiseSqrt();
+}
+
+Eigen::Vector3d GnssPositionControl::return_std(const GnssFix& fix) const {
+  return returns(fix.t_us, fix.fix_type) ? kReturn : Eigen::Vector3d::Zero();
 }
 
 /// After an outage a receiver without a fixed phase may come back displaced.
@@ -74,11 +83,10 @@ GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const 
   const Receiver& r = receiver(fix.fix_type);
   Bias bias;
   bias.like = lasting(fix.fix_type);
-  bias.stationary_std = (bias.like.share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
-  bias.std = bias.stationary_std;
+  bias.std = (bias.like.share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
   const bool after_outage = tried_at_us_ != 0 && seconds_between(tried_at_us_, fix.t_us) > kOutage;
   bias.anew = tried_at_us_ == 0 || after_outage || fix.fix_type != last_type_;
-  if (returns(fix.t_us, fix.fix_type)) bias.std = (bias.std.cwiseAbs2() + return_variance()).cwiseSqrt();
+  bias.returns = returns(fix.t_us, fix.fix_type);
   return bias;
 }
 
@@ -92,12 +100,16 @@ Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queu
   m.residual += filter.state().x.gnss_bias;
   m.H.middleCols<3>(kGnssBias).setZero();
   m.R.diagonal() += bias.std.cwiseAbs2();
+  if (!bias.returns) return m;
+  m.residual += filter.state().x.gnss_return;
+  m.H.middleCols<3>(kGnssReturn).setZero();
+  m.R.diagonal() += kReturn.cwiseAbs2();
   return m;
 }
 
 /// How b moves from now on.
 void GnssPositionControl::set_noise(Filter& filter, const Bias& bias) const {
-  filter.gnss_bias().position_std = bias.stationary_std;
+  filter.gnss_bias().position_std = bias.std;
   for (int i = 0; i < 3; ++i) {
     const bool off = displaced() || (i == 2 && height_displaced_);
     filter.gnss_bias().position_time(i) = off ? kForEver : 1.0 / bias.like.rate;
@@ -114,19 +126,19 @@ void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
     filter.rescale_gnss_bias(kGnssBias, bias.like.share / share_);
   }
   share_ = bias.like.share;
+  if (bias.returns) filter.begin_return(kReturn);
 }
 
 AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) const {
   Bias bias = bias_of(fix);
   set_noise(filter, bias);
-  bias.anew = false;
+  bias = bias.begun();
   return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
 
 /// (N.5.12): errors of Student's t. What a fix misses by beyond its noise widens that noise and the Gauss-Markov error by
 /// the weight of the scale mixture, (nu + m) / (nu + d); no gate, and the next fix may be off by the same.
 AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias) {
-  bias.stationary_std *= std::sqrt(error_time_.variance_factor());
   bias.std *= std::sqrt(error_time_.variance_factor());
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), open_.nis[3]);
   if (r.status != AidingStatus::kAccepted) return r;
@@ -144,11 +156,10 @@ AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued&
   filter.gnss_bias().position_time.z() = ErrorTime::kPrior;  // nothing drives up and down that would show it
   for (int i = 0; i < 3 && wider > 1.0; ++i) {
     BaseVector d = BaseVector::Zero();
-    d(kGnssBias + i) = std::sqrt(wider - 1.0) * bias.stationary_std(i);
+    d(kGnssBias + i) = std::sqrt(wider - 1.0) * bias.std(i);
     filter.widen(d);
   }
-  Bias now = bias;
-  now.anew = false;
+  const Bias now = bias.begun();
   Measurement<3> m = measurement(filter, fix, now);
   m.R *= wider;
   (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, m, open_.nis[3]);
@@ -159,6 +170,7 @@ AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued&
   if (config_.aiding.lasting_errors)
     error_time_.see_innovation(
         {r.innovation[0] / std::sqrt(r.innovation_variance[0]), r.innovation[1] / std::sqrt(r.innovation_variance[1])});
+  settle(filter, fix);
   note(fix);
   return r;
 }
@@ -170,10 +182,13 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   error_time_.clear();
   const Eigen::Vector2d before = off_way(filter, fix);
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
+  if (r.status == AidingStatus::kGated && filter.returning() && jumped_back(filter, fix, bias)) {
+    bias.returns = true;
+    r.status = AidingStatus::kAccepted;
+  }
   if (displaced() && r.status != AidingStatus::kBadInput) {
     if (is_back(filter, fix, bias, r.log_likelihood)) {
       bias.anew = true;
-      bias.std = bias.stationary_std;
       r.status = AidingStatus::kAccepted;
     } else if (seconds_between(displaced_since_us_, fix.t_us) > kLongestDisplaced) {
       r = believe(filter, fix, bias);
@@ -181,15 +196,16 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   }
   if (r.status == AidingStatus::kAccepted) {
     set_bias(filter, bias);
-    bias.anew = false;
+    bias = bias.begun();
     (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
     if (!displaced()) learn(fix, r);
-    if (std::abs(filter.state().x.gnss_bias.z()) < kBackSigmas * bias.stationary_std.z()) height_displaced_ = false;
+    if (std::abs(filter.state().x.gnss_bias.z()) < kBackSigmas * bias.std.z()) height_displaced_ = false;
   } else if (r.status == AidingStatus::kGated) {
     const AidingRecord level = use_level(filter, fix, bias);
     r = level.status == AidingStatus::kAccepted ? level : decide(filter, fix, bias, r);
   }
   if (r.status == AidingStatus::kAccepted) watch(filter, fix, bias_of(fix), before);
+  settle(filter, fix);
   if (r.status == AidingStatus::kReset) forget_way();
   if (r.status == AidingStatus::kAccepted || r.status == AidingStatus::kReset) {
     note(fix);
@@ -198,11 +214,18 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   return r;
 }
 
+/// What the receiver brought back is gone at once: a fix without it agrees.
+bool GnssPositionControl::jumped_back(const Filter& filter, const Queued& fix, const Bias& bias) const {
+  Measurement<3> m = measurement(filter, fix, bias);
+  m.residual += filter.state().x.gnss_return;
+  m.H.middleCols<3>(kGnssReturn).setZero();
+  return filter.judge(AidingSource::kGnssPosition, fix.t_us, m, gates_.nis[3]).status == AidingStatus::kAccepted;
+}
+
 /// A displaced receiver that comes back, (N.5.6): cumulative sum of the log-likelihood ratios of fixes.
 bool GnssPositionControl::is_back(Filter& filter, const Queued& fix, const Bias& bias, double log_likelihood) {
   Bias none = bias;
   none.anew = true;
-  none.std = none.stationary_std;
   const AidingRecord r =
       filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), gates_.nis[3]);
   if (r.status != AidingStatus::kAccepted) {
@@ -221,9 +244,8 @@ AidingRecord GnssPositionControl::believe(Filter& filter, const Queued& fix, con
   displaced_since_us_ = 0;
   Bias none = bias;
   none.anew = true;
-  none.std = none.stationary_std;
   set_bias(filter, none);
-  none.anew = false;
+  none = none.begun();
   widen_filter(filter, fix, off);
   AidingRecord r =
       filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), Gates::open().nis[3]);
@@ -239,19 +261,12 @@ void GnssPositionControl::learn(const Queued& fix, const AidingRecord& r) {
 /// A used fix shows what of its kind's errors lasts, (N.5.4), unless what it has brought back from an outage is still there.
 void GnssPositionControl::watch(const Filter& filter, const Queued& fix, const Bias& bias,
                                 const Eigen::Vector2d& before) {
-  if (returns(fix.t_us, fix.fix_type)) returned_at_us_ = fix.t_us;
   LastingErrorModels& models = receivers_[static_cast<size_t>(fix.fix_type)].lasting;
   if (bias.anew) models.begin_anew();
-  if (!config_.aiding.lasting_errors || displaced() || returning(fix, bias.like)) return models.begin_anew();
+  if (!config_.aiding.lasting_errors || displaced() || filter.returning()) return models.begin_anew();
   const Eigen::Array2d velocity = filter.state().P().diagonal().segment<2>(kVel);
   models.add({fix.t_us, before, off_way(filter, fix), fix.cov.diagonal().head<2>(),
               2.0 * kVelocityTime * velocity + kLeastDrift * kLeastDrift});
-}
-
-bool GnssPositionControl::returning(const Queued& fix, const LastingError& like) const {
-  if (returned_at_us_ == 0) return false;
-  const double left = kReturnLevel * std::exp(-like.rate * seconds_between(returned_at_us_, fix.t_us));
-  return left * left > fix.cov(0, 0);
 }
 
 /// The height alone contradicts: it becomes an error of the receiver's height, which fades as its errors do.
@@ -268,8 +283,7 @@ AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix, c
   if (r.status != AidingStatus::kAccepted) return r;
   height_displaced_ = true;
   set_bias(filter, bias);
-  Bias now = bias;
-  now.anew = false;
+  const Bias now = bias.begun();
   const Measurement<3> all = measurement(filter, fix, now);
   (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, level_of(all), Gates::open().nis[2]);
   BaseVector wider = BaseVector::Zero();
@@ -307,8 +321,7 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
   if (rejected_ < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
   if (!filter_is_wrong) set_displaced(fix.t_us);
   set_bias(filter, bias);
-  Bias now = bias;
-  now.anew = false;
+  const Bias now = bias.begun();
   if (filter_is_wrong) {
     widen_filter(filter, fix, off);
   } else {

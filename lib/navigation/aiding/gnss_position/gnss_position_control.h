@@ -30,8 +30,9 @@ class GnssPositionControl {
     note(fix);
     share_ = lasting(fix.fix_type).share;
   }
-  /// m, of the Gauss-Markov error in a fix, level axes.
+  /// m, level axes: of the Gauss-Markov error in a fix, and of what it may have brought back from an outage.
   [[nodiscard]] Eigen::Vector3d lasting_std(const GnssFix& fix) const;
+  [[nodiscard]] Eigen::Vector3d return_std(const GnssFix& fix) const;
 
   /// The step detector found that the receiver is displaced.
   void set_displaced(int64_t t_us) {
@@ -63,8 +64,8 @@ class GnssPositionControl {
       r.scale.serialise(a);
       r.lasting.serialise(a);
     }
-    a(used_at_us_, tried_at_us_, returned_at_us_, last_type_, share_, rejected_, rejected_since_us_,
-      displaced_since_us_, back_, first_off_, height_displaced_, way_, way_std_, last_spread_);
+    a(used_at_us_, tried_at_us_, last_type_, share_, rejected_, rejected_since_us_, displaced_since_us_, back_,
+      first_off_, height_displaced_, way_, way_std_, last_spread_);
     error_time_.serialise(a);
     serialise_optional(
         a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
@@ -79,8 +80,11 @@ class GnssPositionControl {
   /// What of the receiver's Gauss-Markov error a fix begins with.
   struct Bias {
     LastingError like;
-    bool anew = false;  ///< another type, or a return from an outage: what b holds is over
-    Eigen::Vector3d stationary_std, std;
+    bool anew = false;     ///< another type, or after an outage: what b holds is over
+    bool returns = false;  ///< from an outage, perhaps displaced
+    Eigen::Vector3d std;   ///< m, stationary
+
+    [[nodiscard]] Bias begun() const { return {like, false, false, std}; }
   };
 
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
@@ -89,7 +93,6 @@ class GnssPositionControl {
     last_type_ = fix.fix_type;
   }
   [[nodiscard]] bool returns(int64_t t_us, FixType type) const;
-  [[nodiscard]] bool returning(const Queued& fix, const LastingError& like) const;
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
   [[nodiscard]] LastingError lasting(FixType type) const;
@@ -103,6 +106,7 @@ class GnssPositionControl {
   AidingRecord use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias);
   AidingRecord use_level(Filter& filter, const Queued& fix, const Bias& bias);
   AidingRecord decide(Filter& filter, const Queued& fix, const Bias& bias, const AidingRecord& rejected);
+  [[nodiscard]] bool jumped_back(const Filter& filter, const Queued& fix, const Bias& bias) const;
   bool is_back(Filter& filter, const Queued& fix, const Bias& bias, double log_likelihood);
   AidingRecord believe(Filter& filter, const Queued& fix, const Bias& bias);
   void widen_filter(Filter& filter, const Queued& fix, const Eigen::Vector3d& off) const;
@@ -111,7 +115,7 @@ class GnssPositionControl {
   NavigationConfig config_;
   Gates gates_, open_;
   std::array<Receiver, 6> receivers_;  // by FixType
-  int64_t used_at_us_ = 0, tried_at_us_ = 0, returned_at_us_ = 0;
+  int64_t used_at_us_ = 0, tried_at_us_ = 0;
   FixType last_type_ = FixType::kNone;
   double share_ = 0.0;  // of the variance, that b has been taken to have
   int rejected_ = 0;    // in a row, that agree with each other

@@ -13,7 +13,7 @@ Measurement<3> gnss_position(const State& state, const BodyMotion& motion, const
   const Eigen::Vector3d velocity = x.nav.velocity + turning;  // of the antenna
   Measurement<3> m;
   const Eigen::Vector3d h =
-      x.nav.position + arm + ahead * velocity + 0.5 * ahead * ahead * motion.acceleration + x.gnss_bias;
+      x.nav.position + arm + ahead * velocity + 0.5 * ahead * ahead * motion.acceleration + x.gnss_bias + x.gnss_return;
   m.residual = z - h;
   m.H.block<3, 3>(0, kPos).setIdentity();
   m.H.block<3, 3>(0, kVel) = ahead * Eigen::Matrix3d::Identity();
@@ -24,6 +24,7 @@ Measurement<3> gnss_position(const State& state, const BodyMotion& motion, const
   m.H.col(kPositionLatency) = -moved;
   m.H.col(kImuOffset) = moved;
   m.H.block<3, 3>(0, kGnssBias).setIdentity();
+  m.H.block<3, 3>(0, kGnssReturn).setIdentity();
   m.R = cov;
   return m;
 }
