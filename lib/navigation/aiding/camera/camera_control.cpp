@@ -21,6 +21,16 @@ constexpr size_t kFlowTracks = 10;       // common, at least
 constexpr double kStillMotion_px = 1.0;  // that a standing car's camera may make: an idling engine
 constexpr double kRayleighMedian = 1.177, kRayleighMedianStd = 0.849;  // of unit sigma; the second over sqrt(n)
 
+// rad and s, of the mounting and the offset: beyond, their second order (half a focal length of 600 px times the square; of
+// a rate that changes by 0.3 rad/s2) passes the tracks' noise.
+constexpr double kTurnKnown = 0.02, kOffsetKnown = 0.05;
+
+bool hardly_known(const State& state) {
+  const auto variance = state.P().diagonal();
+  return variance.segment<3>(kCameraTurn).maxCoeff() > kTurnKnown * kTurnKnown ||
+         variance(kCameraOffset) > kOffsetKnown * kOffsetKnown;
+}
+
 int64_t micros(double s) { return static_cast<int64_t>(std::llround(1e6 * s)); }
 
 }  // namespace
@@ -110,7 +120,8 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
   const bool full = static_cast<int>(state.clones.size()) > tuning_.poses;
   choose_tracks(state, full);
   try_tracks(state);
-  const bool iterated = update_.counts().residual_sum > tuning_.iterate_above * update_.counts().dof_sum;
+  const bool iterated =
+      hardly_known(state) && update_.counts().residual_sum > tuning_.iterate_above * update_.counts().dof_sum;
   std::optional<State> settled;
   if (iterated) settled = iterate(state);
   judge(dt_s);
