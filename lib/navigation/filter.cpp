@@ -87,7 +87,9 @@ void integrate(Mean& x, inertial::InertialStep& last, BodyMotion& motion, inerti
 void Filter::predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise) {
   Mean& x = state_.x;
   sums_.add(x.nav, x.corrected(imu.gyro, imu.accel, dt), noise);
+  const Eigen::Vector3d before = x.nav.velocity;
   integrate(x, last_, motion_, earth_, imu, dt);
+  motion_.lag.advance(x.nav.velocity - before, dt);
   for (int i = 0; i < 3; ++i) x.gnss_bias(i) *= inertial::gauss_markov_decay(dt, gnss_bias_.position_time(i));
   x.gnss_velocity_bias *= inertial::gauss_markov_decay(dt, gnss_bias_.velocity_time);
   if (returning()) x.gnss_return *= std::exp(-dt * std::exp(x.return_rate));

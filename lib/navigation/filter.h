@@ -7,6 +7,7 @@
 #include "navigation/config.h"
 #include "navigation/measurement.h"
 #include "navigation/step_detector.h"
+#include "navigation/velocity_lag.h"
 
 namespace roadfix::navigation {
 
@@ -14,6 +15,7 @@ namespace roadfix::navigation {
 struct BodyMotion {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< rad/s against the Earth, imu axes, smoothed
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s2, dv/dt, level axes, smoothed
+  VelocityLag lag;                                         ///< of the filter alone, not of its output
 };
 
 /// Moves the means over the `dt` s that end at imu.t_us, (N.2.1) to (N.2.3); GNSS biases decay elsewhere.
@@ -100,6 +102,7 @@ class Filter {
     sums_.serialise(a);
     last_.serialise(a);
     steps_.serialise(a);
+    motion_.lag.serialise(a);
     a(motion_.rate, motion_.acceleration, considered_first_, considered_size_, gnss_bias_.position_std,
       gnss_bias_.velocity_std, gnss_bias_.position_time, gnss_bias_.velocity_time, gnss_bias_.position_walk);
   }

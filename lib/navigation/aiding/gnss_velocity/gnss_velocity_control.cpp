@@ -8,7 +8,7 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr LastingError kWithoutImu = {0.5, 0.5};  // nothing propagates a velocity well enough to show it
-constexpr double kSmoothing = 0.1;    // s, of a receiver's low-pass filter: its error grows with the acceleration
+constexpr double kSmoothing = 0.1;    // s, what is left of a receiver's low pass: its error grows with the acceleration
 constexpr int kPersistent = 8;        // rejected in a row: more than a cluster of bad ones
 constexpr double kOutage = 3.0;       // s without a velocity, over which nothing is compared
 constexpr double kTiltTime = 10.0;    // s, for which tilt and biases of an aided filter are off by the same
@@ -26,12 +26,6 @@ Eigen::Vector2d drift_rate(Filter& filter) {
   return (2.0 * kTiltTime * (H * P * H.transpose()).diagonal().array() + kLeastDrift * kLeastDrift).matrix();
 }
 
-/// m/s, level: a velocity less the filter's, with the receiver's error in it.
-Eigen::Vector2d off_way(const Filter& filter, const Queued& v) {
-  const State& s = filter.state();
-  return (gnss_velocity(s, filter.motion(), v.value, v.cov, v.ahead(s.x)).residual + s.x.gnss_velocity_bias).head<2>();
-}
-
 }  // namespace
 
 LastingError GnssVelocityControl::lasting() const {
@@ -39,12 +33,23 @@ LastingError GnssVelocityControl::lasting() const {
   return has_imu_ ? models_.mean() : kWithoutImu;
 }
 
+Measurement<3> GnssVelocityControl::measurement(const Filter& filter, const Queued& velocity, double white) const {
+  const SmoothingTime::Expected smoothed = smoothing_.expected(filter.motion().lag, filter.motion().acceleration);
+  BodyMotion motion = filter.motion();
+  motion.acceleration = smoothed.rate;
+  return gnss_velocity(filter.state(), motion, velocity.value - smoothed.lag, white * velocity.cov + smoothed.spread,
+                       velocity.ahead(filter.state().x));
+}
+
+Eigen::Vector2d GnssVelocityControl::off_way(const Filter& filter, const Queued& velocity) const {
+  return (measurement(filter, velocity, 1.0).residual + filter.state().x.gnss_velocity_bias).head<2>();
+}
+
 AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, double gate) const {
   const LastingError like = lasting();
   const double factor = scale_.variance_factor();
-  const Eigen::Vector3d lag = kSmoothing * filter.motion().acceleration;
-  Measurement<3> m = gnss_velocity(filter.state(), filter.motion(), velocity.value,
-                                   factor * (1.0 - like.share) * velocity.cov, velocity.ahead(filter.state().x));
+  const Eigen::Vector3d left = kSmoothing * filter.motion().acceleration;
+  Measurement<3> m = measurement(filter, velocity, factor * (1.0 - like.share));
   // A smoothed velocity looks like an antenna elsewhere: the antenna's place is noise here, and not estimated.
   const Eigen::Matrix3d by_antenna = m.H.middleCols<3>(kAntenna);
   m.R += by_antenna * filter.state().P().block<3, 3>(kAntenna, kAntenna) * by_antenna.transpose();
@@ -52,7 +57,7 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
   const AidingRecord r = filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
   if (r.status != AidingStatus::kAccepted || !lasting_) return r;
   filter.gnss_bias().velocity_time = 1.0 / like.rate;
-  filter.gnss_bias().velocity_std = (factor * (like.share * velocity.cov.diagonal() + lag.cwiseAbs2())).cwiseSqrt();
+  filter.gnss_bias().velocity_std = (factor * (like.share * velocity.cov.diagonal() + left.cwiseAbs2())).cwiseSqrt();
   return r;
 }
 
@@ -61,7 +66,9 @@ AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {
   const AidingRecord r = fuse(filter, velocity, gates_.nis[3]);
   rejected_ = r.status == AidingStatus::kGated ? rejected_ + 1 : 0;
   if (r.status == AidingStatus::kAccepted || rejected_ >= kPersistent) scale_.learn(r);
-  if (r.status == AidingStatus::kAccepted && lasting_ && has_imu_) watch(filter, velocity, before);
+  if (r.status != AidingStatus::kAccepted) return r;
+  if (lasting_ && has_imu_) watch(filter, velocity, before);
+  smoothing_.learn(r, filter.motion().lag);
   return r;
 }
 

@@ -1,0 +1,82 @@
+// The low pass of a receiver's velocities: the lag against a filter made in small steps, and the time constant that the
+// innovations show.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "navigation/aiding/gnss_velocity/smoothing_time.h"
+
+using namespace roadfix::navigation;
+
+namespace {
+
+constexpr double kImu = 0.01, kFix = 0.25, kSigma = 0.05;  // s, s, m/s
+
+/// A car that speeds up, goes on and brakes again and again.
+Eigen::Vector3d acceleration_at(double t, double most) {
+  return most * std::sin(0.5 * t) * Eigen::Vector3d(0.8, 0.6, 0.0);
+}
+
+/// What `duration` s of velocities through a low pass of `tau` s, claimed right, leave to be believed of each time
+/// constant.
+SmoothingTime learnt(double tau, double most, double duration, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> n(0.0, kSigma);
+  SmoothingTime time;
+  VelocityLag lag;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), filtered = Eigen::Vector3d::Zero();
+  const int fix = static_cast<int>(kFix / kImu);
+  for (int i = 1; i * kImu < duration; ++i) {
+    const Eigen::Vector3d before = velocity;
+    velocity += kImu * acceleration_at(i * kImu, most);
+    filtered = tau == 0.0 ? velocity : Eigen::Vector3d(velocity + std::exp(-kImu / tau) * (filtered - velocity));
+    lag.advance(velocity - before, kImu);
+    if (i % fix != 0) continue;
+    const SmoothingTime::Expected e = time.expected(lag, acceleration_at(i * kImu, most));
+    const Eigen::Vector3d innovation = filtered + Eigen::Vector3d(n(rng), n(rng), n(rng)) - (velocity + e.lag);
+    const Eigen::Vector3d variance = e.spread.diagonal().array() + kSigma * kSigma;
+    AidingRecord r;
+    r.dof = 3;
+    for (int k = 0; k < 3; ++k) {
+      r.innovation[static_cast<size_t>(k)] = innovation(k);
+      r.innovation_variance[static_cast<size_t>(k)] = variance(k);
+    }
+    time.learn(r, lag);
+  }
+  return time;
+}
+
+}  // namespace
+
+TEST_CASE("the lag is that of a low pass, and none without one") {
+  VelocityLag lag;
+  for (int i = 0; i < 1000; ++i) lag.advance(Eigen::Vector3d(0.02, 0.0, 0.0), kImu);  // 2 m/s2
+  const Eigen::Vector3d a(2.0, 0.0, 0.0);
+  CHECK(lag.lag(0).isZero());
+  CHECK(lag.rate(0, a) == a);
+  for (int k = 1; k < VelocityLag::kCount; ++k) {
+    const double tau = VelocityLag::time(k), reached = 1.0 - std::exp(-10.0 / tau);
+    CAPTURE(tau);
+    CHECK(std::abs(lag.lag(k).x() / (-2.0 * tau * reached) - 1.0) < 0.01);
+    CHECK(std::abs(lag.rate(k, a).x() / (2.0 * reached) - 1.0) < 0.01);
+  }
+}
+
+TEST_CASE("accelerations show the receiver's time constant, or that it has none") {
+  for (int k = 0; k < VelocityLag::kCount; ++k)
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      CAPTURE(k, seed);
+      CHECK(learnt(VelocityLag::time(k), 2.0, 30.0, seed).probability(k) > 0.99);
+    }
+}
+
+TEST_CASE("a time constant in between goes to its neighbours") {
+  const SmoothingTime t = learnt(0.35, 2.0, 30.0, 1);
+  CHECK(t.probability(2) + t.probability(3) > 0.99);
+  CHECK(t.probability(0) < 0.01);
+}
+
+TEST_CASE("a steady speed shows nothing") {
+  const SmoothingTime before, t = learnt(1.0, 0.0, 30.0, 1);
+  for (int k = 0; k < VelocityLag::kCount; ++k) CHECK(std::abs(t.probability(k) - before.probability(k)) < 1e-12);
+}
