@@ -115,6 +115,8 @@ class Navigation {
     return !s.gnss_position && !s.gnss_velocity && !s.gnss_heading;
   }
   [[nodiscard]] std::optional<int64_t> coasting_since() const;
+  /// s without aiding that are no coasting yet: a receiver that gives a fix every five seconds is not silent for those.
+  [[nodiscard]] double coasting_time() const;
   [[nodiscard]] bool moved_meanwhile(double dt) const;
   void count_reset(const SE3& before, const Mean& after);
   void rebase_predictor();

@@ -66,12 +66,17 @@ NavigationOutput Navigation::output() {
   return out;
 }
 
+double Navigation::coasting_time() const {
+  constexpr double kMissed = 2.0;  // intervals, after which a fix has been missed
+  return std::max(config_.start.coasting_s, kMissed * screen_.interval());
+}
+
 std::optional<int64_t> Navigation::coasting_since() const {
   const auto used_at = [&](AidingSource source) { return used_at_us_[static_cast<size_t>(source)]; };
   int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
   if (local())
     anchored = std::max({anchored, used_at(AidingSource::kWheelSpeed), used_at(AidingSource::kCameraTracks)});
-  const bool coasting = usable() && seconds_between(anchored, last_step_us_) > config_.start.coasting_s;
+  const bool coasting = usable() && seconds_between(anchored, last_step_us_) > coasting_time();
   return coasting ? std::optional(anchored) : std::nullopt;
 }
 
@@ -89,8 +94,7 @@ NavigationStatus Navigation::status() const {
   s.wheel_scale_steps = steps_ + aiding_.wheel_speed().scale_steps();
   s.imu_frozen = imu_noise_.frozen();
   for (size_t i = 0; i < kAidingSources; ++i)
-    if (used_at_us_[i] != 0 && seconds_between(used_at_us_[i], last_step_us_) <= config_.start.coasting_s)
-      s.aided_by |= 1 << i;
+    if (used_at_us_[i] != 0 && seconds_between(used_at_us_[i], last_step_us_) <= coasting_time()) s.aided_by |= 1 << i;
   s.coasting = coasting_since().has_value();
   s.coasting_since_us = coasting_since().value_or(0);
   return s;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace roadfix::navigation {
 
@@ -95,6 +96,10 @@ AidingStatus GnssScreen::check(const GnssFix& fix) {
   }
   quality_ = GnssQuality::kGood;
   reason_ = kFine;
+  if (fix.t_us > good_at_us_) {
+    interval_before_us_ = std::exchange(interval_us_, good_at_us_ == 0 ? 0 : fix.t_us - good_at_us_);
+    good_at_us_ = fix.t_us;
+  }
   return AidingStatus::kAccepted;
 }
 

@@ -73,3 +73,20 @@ TEST_CASE("a receiver that was bad is believed after three good fixes, by the st
   CHECK(screen.check(good()) == AidingStatus::kAccepted);
   CHECK(screen.quality() == GnssQuality::kGood);
 }
+
+TEST_CASE("the receiver's interval is that of its fixes, and an outage is none") {
+  GnssScreen screen((GnssScreenConfig()));
+  GnssFix f = good();
+  const auto after = [&](double s) {
+    f.t_us += static_cast<int64_t>(1e6 * s);
+    REQUIRE(screen.check(f) == AidingStatus::kAccepted);
+    return screen.interval();
+  };
+  after(0.0);
+  after(5.0);
+  CHECK(after(5.0) == 5.0);
+  CHECK(after(60.0) == 5.0);
+  CHECK(after(5.0) == 5.0);
+  after(1.0);
+  CHECK(after(1.0) == 1.0);
+}
