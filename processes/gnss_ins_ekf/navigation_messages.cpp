@@ -42,12 +42,28 @@ void fill_estimates(const navigation::Filter& filter, const navigation::VehicleF
   m.wheel_latency_std_s = std_of(P, kWheelLatency);
 }
 
-/// The values of AidingSource in aiding_t's words; those of the first eight, and the bits of aided_by, are the same.
+/// AidingSource in aiding_t's words and as a bit of ins_status_t's, AidingStatus in aiding_t's: by name, since those of the
+/// library may come in another order.
 constexpr std::array<int8_t, navigation::kAidingSources> kSources = {
     aiding_t::SOURCE_GNSS_POSITION, aiding_t::SOURCE_GNSS_VELOCITY, aiding_t::SOURCE_GNSS_HEADING,
     aiding_t::SOURCE_WHEEL_SPEED,   aiding_t::SOURCE_NO_SIDESLIP,   aiding_t::SOURCE_ZERO_VELOCITY,
     aiding_t::SOURCE_ZERO_RATE,     aiding_t::SOURCE_MAG_HEADING,   aiding_t::SOURCE_WHEEL_YAW_RATE,
     aiding_t::SOURCE_CAMERA_TRACKS, aiding_t::SOURCE_PRIOR_POSE};
+constexpr std::array<int32_t, navigation::kAidingSources> kAided = {
+    ins_status_t::AIDED_GNSS_POSITION, ins_status_t::AIDED_GNSS_VELOCITY, ins_status_t::AIDED_GNSS_HEADING,
+    ins_status_t::AIDED_WHEEL_SPEED,   ins_status_t::AIDED_NO_SIDESLIP,   ins_status_t::AIDED_ZERO_VELOCITY,
+    ins_status_t::AIDED_ZERO_RATE,     ins_status_t::AIDED_MAG_HEADING,   ins_status_t::AIDED_WHEEL_YAW_RATE,
+    ins_status_t::AIDED_CAMERA_TRACKS, ins_status_t::AIDED_PRIOR_POSE};
+constexpr std::array<int8_t, 7> kStatuses = {
+    aiding_t::STATUS_ACCEPTED,    aiding_t::STATUS_GATED, aiding_t::STATUS_NOT_READY, aiding_t::STATUS_BAD_INPUT,
+    aiding_t::STATUS_BAD_QUALITY, aiding_t::STATUS_RESET, aiding_t::STATUS_DISABLED};
+
+int32_t aided_by(int sources) {
+  int32_t bits = 0;
+  for (size_t i = 0; i < kAided.size(); ++i)
+    if ((sources >> i & 1) != 0) bits |= kAided[i];
+  return bits;
+}
 
 int8_t pose_state(const navigation::NavigationOutput& output) {
   if (output.odometry.validity == Validity::kValid) return pose_t::STATE_RUNNING;
@@ -84,7 +100,7 @@ ins_status_t ins_status(const navigation::NavigationStatus& status, const naviga
   m.alignment = static_cast<int8_t>(status.phase);
   m.waits_for = status.waits_for;
   m.heading_confirmed = status.phase == navigation::Phase::kDone;
-  m.aided_by = status.aided_by;
+  m.aided_by = aided_by(status.aided_by);
   m.coasting = status.coasting;
   m.coasting_since_utime = status.coasting_since_us;
   m.gnss_quality = static_cast<int8_t>(status.gnss_quality);
@@ -100,7 +116,7 @@ aiding_t aiding(const navigation::AidingRecord& record) {
   m.measurement_utime = record.t_us;
   m.measurement_seq = record.id;
   m.source = kSources[static_cast<size_t>(record.source)];
-  m.status = static_cast<int8_t>(record.status);
+  m.status = kStatuses[static_cast<size_t>(record.status)];
   m.nis = record.nis;
   m.dof = record.dof;
   const auto n = static_cast<size_t>(record.dof);
