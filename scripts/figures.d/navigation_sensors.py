@@ -119,6 +119,20 @@ def sparse_fixes_valid(runs):
     return runs.scored(CHANNEL, STAGES, "car_0708", "gnss_every=20", "score_skip_s=60", config=defaults(runs))["availability"]["valid"]
 
 
+def late_return_s(runs):
+    """From the third fix after an outage until the error is below a metre: of all outages of all phases the 95th percentile."""
+    length, first, every, phases = 30, 60, 90, (0, 15, 30, 45, 60, 75)
+    words = ("gnss_every=4", f"cut_gnss_s={length}", f"every_s={every}", f"after_s={first}", f"phase_s={','.join(map(str, phases))}")
+    times = []
+    for channels, folder in runs.recorded(STAGES, "car_0708", *words, config=defaults(runs)):
+        with open(folder / "report" / f"{CHANNEL}_errors.csv", newline="") as file:
+            rows = [(int(row["utime_us"]), math.hypot(float(row["longitudinal_m"]), float(row["lateral_m"]))) for row in csv.DictReader(file)]
+        for outage in channels[CHANNEL]["outages"]["each"]:
+            third = outage["return_us"] + 2_000_000
+            times.append(next(((t - third) * 1e-6 for t, error in rows if t >= third and error < 1.0), math.inf))
+    return sorted(times)[math.ceil(0.95 * len(times)) - 1]
+
+
 def lever_wrong_3sigma(runs):
     folder = copied(runs, "adis_semisim", "lever_wrong")
     wrong = [round(true + off, 3) for true, off in zip((-0.073, -0.302, -0.087), LEVER_WRONG_M)]
@@ -135,4 +149,5 @@ MEASUREMENTS = {
     "smoothed_velocity_ratio": smoothed_velocity_ratio,
     "sparse_fixes_valid": sparse_fixes_valid,
     "lever_wrong_3sigma": lever_wrong_3sigma,
+    "late_return_s": late_return_s,
 }
