@@ -127,5 +127,5 @@ TEST_CASE("wheels that slip by less than their gate do not lead away from fixed 
 }
 
 TEST_CASE("a receiver that repeats itself does not make wheels doubted") {
-  check_held(drive_with("gnss.stuck@60+20", 120.0, 1), 1.0, 0.08);
+  check_held(drive_with("gnss.stuck@60+20", 120.0, 1), 1.0, 0.05);
 }
