@@ -80,6 +80,39 @@ class Build(unittest.TestCase):
         self.assertNotIn("Building", done.stderr)
 
 
+class WithoutTests(unittest.TestCase):
+    """Which way scripts/build configures a folder: a cmake that writes down what it was asked for stands in for CMake."""
+
+    def configured(self, arguments, cached=None):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for path in ("scripts", "bin", "build/release"):
+                (folder / path).mkdir(parents=True)
+            (folder / "CMakePresets.json").touch()
+            if cached:
+                (folder / "build/release/CMakeCache.txt").write_text(f"ROADFIX_TESTS:BOOL={cached}\n")
+                (folder / "build/release/build.ninja").touch()
+            (folder / "scripts/build").write_text((ROOT / "scripts/build").read_text())
+            cmake = folder / "bin/cmake"
+            cmake.write_text('#!/bin/sh\n[ "$1" = --build ] || echo "$*" >>configured\n')
+            cmake.chmod(0o755)
+            path = f"{folder / 'bin'}:{os.environ['PATH']}"
+            done = subprocess.run(["bash", "scripts/build", *arguments], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            asked = folder / "configured"
+            return asked.read_text() if asked.exists() else ""
+
+    def test_a_new_folder_has_tests_unless_told(self):
+        self.assertEqual(self.configured([]), "--preset release\n")
+        self.assertEqual(self.configured(["--without-tests", "release", "roadfix"]), "--preset release -DROADFIX_TESTS=OFF\n")
+
+    def test_tests_are_added_and_never_taken_away(self):
+        self.assertEqual(self.configured(["release"], cached="OFF"), "--preset release\n")
+        self.assertEqual(self.configured(["--without-tests", "release"], cached="ON"), "")
+        self.assertEqual(self.configured(["--without-tests", "release"], cached="OFF"), "")
+        self.assertEqual(self.configured(["release"], cached="ON"), "")
+
+
 class Demo(unittest.TestCase):
     def demo(self, files_in_cache):
         """scripts/demo in a folder of its own, with a build that says what it was asked for and makes a tool that does nothing."""
@@ -103,7 +136,7 @@ class Demo(unittest.TestCase):
     def test_only_the_tool_is_built_and_the_time_is_told(self):
         done = self.demo(5)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("asked for: release roadfix; cache off: no\n", done.stdout)
+        self.assertIn("asked for: --without-tests release roadfix; cache off: no\n", done.stdout)
         self.assertRegex(done.stdout, r"roadfix evaluate\nscripts/demo: [0-9.]+ min: packages [0-9.]+ min, build [0-9.]+ min, run [0-9.]+ min\n$")
 
     def test_an_empty_compiler_cache_is_left_alone(self):
