@@ -93,6 +93,8 @@ class WithoutTests(unittest.TestCase):
                 (folder / "build/release/CMakeCache.txt").write_text(f"ROADFIX_TESTS:BOOL={cached}\n")
                 (folder / "build/release/build.ninja").touch()
             (folder / "scripts/build").write_text((ROOT / "scripts/build").read_text())
+            (folder / "scripts/setup").write_text('#!/bin/sh\necho "setup $*" >>configured\n')
+            (folder / "scripts/setup").chmod(0o755)
             cmake = folder / "bin/cmake"
             cmake.write_text('#!/bin/sh\n[ "$1" = --build ] || echo "$*" >>configured\n')
             cmake.chmod(0o755)
@@ -107,7 +109,7 @@ class WithoutTests(unittest.TestCase):
         self.assertEqual(self.configured(["--without-tests", "release", "roadfix"]), "--preset release -DROADFIX_TESTS=OFF\n")
 
     def test_tests_are_added_and_never_taken_away(self):
-        self.assertEqual(self.configured(["release"], cached="OFF"), "--preset release\n")
+        self.assertEqual(self.configured(["release"], cached="OFF"), "setup \n--preset release\n")
         self.assertEqual(self.configured(["--without-tests", "release"], cached="ON"), "")
         self.assertEqual(self.configured(["--without-tests", "release"], cached="OFF"), "")
         self.assertEqual(self.configured(["release"], cached="ON"), "")

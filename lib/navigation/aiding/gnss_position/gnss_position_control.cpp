@@ -75,7 +75,7 @@ Eigen::Vector3d GnssPositionControl::return_std(const GnssFix& fix) const {
 
 /// After an outage a receiver without a fixed phase may come back displaced.
 bool GnssPositionControl::returns(int64_t t_us, FixType type) const {
-  return tried_at_us_ != 0 && seconds_between(tried_at_us_, t_us) > kOutage && type != FixType::kRtkFixed &&
+  return used_at_us_ != 0 && seconds_between(used_at_us_, t_us) > kOutage && type != FixType::kRtkFixed &&
          config_.aiding.lasting_errors;
 }
 
@@ -84,8 +84,8 @@ GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const 
   Bias bias;
   bias.like = lasting(fix.fix_type);
   bias.std = (bias.like.share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
-  const bool after_outage = tried_at_us_ != 0 && seconds_between(tried_at_us_, fix.t_us) > kOutage;
-  bias.anew = tried_at_us_ == 0 || after_outage || fix.fix_type != last_type_;
+  const bool after_outage = used_at_us_ != 0 && seconds_between(used_at_us_, fix.t_us) > kOutage;
+  bias.anew = used_at_us_ == 0 || after_outage || fix.fix_type != last_type_;
   bias.returns = returns(fix.t_us, fix.fix_type);
   return bias;
 }

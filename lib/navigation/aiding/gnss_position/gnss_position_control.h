@@ -1,9 +1,9 @@
 /// When and with what noise a GNSS position is used: the one error model of a receiver, (N.5) of MODEL.md.
 ///
 /// A position is h + b + n: n white with an adaptive scale, b a Gauss-Markov state whose share of the variance and time
-/// are those that explain the fixes best against the way driven. What the gate rejects is a single outlier, a displaced receiver or a wrong filter:
-/// runs of rejected fixes that agree with each other are decided by the likelihoods of the last two under heavy-tailed
-/// priors, and b or the filter is widened by what they differ.
+/// are those that explain the fixes best against the way driven. What the gate rejects is a single outlier, a displaced
+/// receiver or a wrong filter: runs of rejected fixes that agree with each other are decided by the likelihoods of the
+/// last two under heavy-tailed priors, and b or the filter is widened by what they differ.
 #pragma once
 
 #include <array>
@@ -64,8 +64,8 @@ class GnssPositionControl {
       r.scale.serialise(a);
       r.lasting.serialise(a);
     }
-    a(used_at_us_, tried_at_us_, last_type_, share_, rejected_, rejected_since_us_, displaced_since_us_, back_,
-      first_off_, height_displaced_, way_, way_std_, last_spread_);
+    a(used_at_us_, last_type_, share_, rejected_, rejected_since_us_, displaced_since_us_, back_, first_off_,
+      height_displaced_, way_, way_std_, last_spread_);
     error_time_.serialise(a);
     serialise_optional(
         a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
@@ -89,7 +89,7 @@ class GnssPositionControl {
 
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
   void note(const Queued& fix) {
-    tried_at_us_ = used_at_us_ = fix.t_us;
+    used_at_us_ = fix.t_us;
     last_type_ = fix.fix_type;
   }
   [[nodiscard]] bool returns(int64_t t_us, FixType type) const;
@@ -115,7 +115,7 @@ class GnssPositionControl {
   NavigationConfig config_;
   Gates gates_, open_;
   std::array<Receiver, 6> receivers_;  // by FixType
-  int64_t used_at_us_ = 0, tried_at_us_ = 0;
+  int64_t used_at_us_ = 0;             // or tried on the hypotheses of a start
   FixType last_type_ = FixType::kNone;
   double share_ = 0.0;  // of the variance, that b has been taken to have
   int rejected_ = 0;    // in a row, that agree with each other
