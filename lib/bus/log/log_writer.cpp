@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -17,6 +18,13 @@ namespace {
 /// Small enough to be full, and so in memory, after the first second of a drive: what it takes never grows.
 constexpr std::size_t kBufferBytes = std::size_t{64} << 10;
 constexpr const char* kWriteFailed = "cannot write the log";
+
+/// True where it then is. What is empty is left alone: ext4 sends a file that was ever truncated to the disk when it is
+/// closed (auto_da_alloc), also one that is deleted a second later.
+bool make_empty(int fd) {
+  struct stat file {};
+  return ::fstat(fd, &file) == 0 && (file.st_size == 0 || ::ftruncate(fd, 0) == 0);
+}
 
 void store(uint8_t* to, uint64_t value, int size) {
   for (int i = 0; i < size; ++i) to[i] = static_cast<uint8_t>(value >> (8 * (size - 1 - i)));
@@ -34,8 +42,7 @@ LogWriter::LogWriter(const std::filesystem::path& path, Mode mode) : path_(path)
   }
   fd_ = ::open(written_path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (fd_ < 0) throw_log_error(written_path_, "cannot create the log");
-  if (std::filesystem::is_regular_file(written_path_) &&
-      (::flock(fd_, LOCK_EX | LOCK_NB) != 0 || ::ftruncate(fd_, 0) != 0)) {
+  if (std::filesystem::is_regular_file(written_path_) && (::flock(fd_, LOCK_EX | LOCK_NB) != 0 || !make_empty(fd_))) {
     ::close(fd_);
     throw_log_error(written_path_, "cannot take the log for writing (does another process write it?)");
   }
