@@ -22,6 +22,7 @@ enum class FaultKind {
   kRepeat,
   kStuck,
   kClock,
+  kDrift,
   kJitter,
   kDelay,
   // Of some.

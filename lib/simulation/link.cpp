@@ -21,7 +21,7 @@ struct LinkEffects {
   double repeat_delay_s = 0.0;
 };
 
-void apply(ActiveFault& fault, LinkEffects& effects) {
+void apply(ActiveFault& fault, double t_s, LinkEffects& effects) {
   constexpr double kRepeatDelay = 0.02;  // s, longest
   switch (fault->kind) {
     case FaultKind::kSilence:
@@ -39,6 +39,9 @@ void apply(ActiveFault& fault, LinkEffects& effects) {
       break;
     case FaultKind::kClock:
       effects.stamp_error_s += fault->get("offset_s");
+      break;
+    case FaultKind::kDrift:
+      effects.stamp_error_s += 1e-6 * fault->get("ppm") * (t_s - fault->start_s);
       break;
     case FaultKind::kJitter:
       effects.stamp_error_s += fault->get("sigma_s") * fault.random.normal();
@@ -68,7 +71,7 @@ std::vector<Transmission> transmit(const SimulatedDrive& drive, Sensor sensor, c
     effects.stamp_error_s =
         link.clock_offset_s + 1e-6 * link.clock_drift_ppm * t_s + link.stamp_jitter_s * random.normal();
     effects.delay_s = link.delay_s + link.delay_jitter_s * random.uniform();
-    faults.for_each(t_s, [&](ActiveFault& f) { apply(f, effects); });
+    faults.for_each(t_s, [&](ActiveFault& f) { apply(f, t_s, effects); });
     if (!effects.stuck) moving = i;
     if (effects.silent) continue;
     Transmission transmission;

@@ -172,6 +172,9 @@ TEST_CASE("clock and jitter move stamps, not the truth") {
   const SimulatedDrive offset = drive_with("imu.clock@30+20:offset_s=0.04");
   CHECK(offset.imu[3500].t_us - offset.deliveries.imu[3500].true_us == 40'000);
   CHECK(offset.imu[2000].t_us == offset.deliveries.imu[2000].true_us);
+  const SimulatedDrive drift = drive_with("imu.drift@30+20:ppm=2000");
+  CHECK(drift.imu[2999].t_us == drift.deliveries.imu[2999].true_us);
+  CHECK(drift.imu[3999].t_us - drift.deliveries.imu[3999].true_us == 20'000);
   const SimulatedDrive jitter = drive_with("imu.jitter@0:sigma_s=0.002");
   double sum = 0.0;
   for (std::size_t i = 0; i < jitter.imu.size(); ++i) {
