@@ -15,10 +15,12 @@ constexpr double kBeyondOthers = 3.0;     // by which the logarithm of the odds 
 struct Block {
   StepKind kind;
   int first, size;
-  double rarity;  ///< minus the logarithm of how often it steps, against the receiver (assumed)
+  /// Minus the logarithm of how often it steps, against the receiver (assumed): that is displaced once an hour, wheels
+  /// change once in seven, and an imu's bias, which temperature moves over minutes, hardly ever does.
+  double rarity;
 };
 constexpr std::array<Block, StepDetector::kKinds> kBlocks = {
-    Block{StepKind::kWheels, 0, 1, 2.0}, Block{StepKind::kImu, 1, 6, 2.0}, Block{StepKind::kReceiver, 7, 6, 0.0}};
+    Block{StepKind::kWheels, 0, 1, 2.0}, Block{StepKind::kImu, 1, 6, 7.0}, Block{StepKind::kReceiver, 7, 6, 0.0}};
 constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10;  // columns
 
 /// A step of normal prior given the evidence: mean, covariance, and the logarithm of the Bayes factor.
