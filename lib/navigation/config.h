@@ -121,7 +121,10 @@ struct StartConfig {
   int headings = 24;          ///< hypotheses around the circle
   double heading_std = 0.15;  ///< rad, of each
   double confirm_probability = 0.999;
-  double confirm_std = 0.052;      ///< rad
+  double confirm_std = 0.052;  ///< rad
+  /// rad, of a heading that is sought: known better, the pose is published. With 0.26 that is 4 s after a start in motion;
+  /// but a tracker begins its own heading from it, and keeps the error.
+  double rough_std = 0.052;
   double coasting_s = 3.0;         ///< s without position, velocity or standstill: coasting
   double invalid_sigma_m = 100.0;  ///< horizontal; more is no position
 };
@@ -210,6 +213,7 @@ void visit(StartConfig& c, Visitor& v) {
   v.number("heading_std_rad", c.heading_std, 0.01, 3.2);
   v.number("confirm_probability", c.confirm_probability, 0.5, 1.0);
   v.number("confirm_std_rad", c.confirm_std, 1e-4, 1.6);
+  v.number("rough_std_rad", c.rough_std, 1e-4, 1.6);
   v.number("coasting_s", c.coasting_s, 0.1, 1e4);
   v.number("invalid_sigma_m", c.invalid_sigma_m, 0.1, 1e6);
 }

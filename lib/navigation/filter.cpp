@@ -241,7 +241,8 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
   for (int k = 0; k < kWithoutCamera; ++k)  // most of H is zero
     for (int r = 0; r < Rows; ++r)
       if (m.H(r, k) != 0.0) Y.col(r) += m.H(r, k) * P.col(k).head(n);
-  const Eigen::Matrix<double, Rows, Rows> S = m.H.lazyProduct(Y.template topRows<kWithoutCamera>()) + m.R;
+  Eigen::Matrix<double, Rows, Rows> S = m.H.lazyProduct(Y.template topRows<kWithoutCamera>()) + m.R;
+  S.diagonal().array() += m.repeated;
   const Innovation<Rows> innovation(m.residual, 0.5 * (S + S.transpose()));
   if (!innovation.usable) return;
   for (int i = 0; i < Rows; ++i) {  // Y L^-T, (N.3.2)

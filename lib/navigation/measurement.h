@@ -16,6 +16,8 @@ struct Measurement {
   Eigen::Matrix<double, Rows, 1> residual = Eigen::Matrix<double, Rows, 1>::Zero();
   Eigen::Matrix<double, Rows, kWithoutCamera> H = Eigen::Matrix<double, Rows, kWithoutCamera>::Zero();
   Eigen::Matrix<double, Rows, Rows> R = Eigen::Matrix<double, Rows, Rows>::Identity();
+  double repeated =
+      0.0;  ///< added to R's diagonal in the update alone: errors that the next ones repeat (Bartlett 1946)
 };
 
 enum class AidingSource {

@@ -395,7 +395,7 @@ const Filter* Navigation::filter() const {
 
 bool Navigation::usable() const {
   if (phase_ != Phase::kHeading) return phase_ == Phase::kDone;
-  return alignment_.hypotheses().heading_std() < config_.start.confirm_std;
+  return alignment_.hypotheses().heading_std() < config_.start.rough_std;
 }
 
 void Navigation::rebase_predictor() {

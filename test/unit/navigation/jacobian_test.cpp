@@ -7,12 +7,14 @@
 #include "navigation/aiding/gnss_velocity/gnss_velocity_model.h"
 #include "navigation/aiding/magnetic_heading/magnetic_heading_model.h"
 #include "navigation/aiding/nonholonomic/nonholonomic_model.h"
+#include "navigation/aiding/second_order.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_model.h"
 #include "navigation/aiding/wheel_yaw_rate/wheel_yaw_rate_model.h"
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
 #include "navigation/motion/road_level.h"
 #include "random_state.h"
 #include "support/numerical_jacobian.h"
+#include "vehicle/axle_velocity.h"
 
 using namespace roadfix;
 using namespace roadfix::navigation;
@@ -131,5 +133,51 @@ TEST_CASE("velocity rows leave the heading unobserved, and one with phi would no
     CHECK(nonholonomic(s, motion, 1, 0.1).H.middleCols<3>(kAtt).isZero(0.0));
     CHECK(zero_velocity(s, 0.1).H.middleCols<3>(kAtt).isZero(0.0));
     CHECK(gnss_velocity(s, motion, s.x.nav.velocity, kCov, 0.0).H.middleCols<3>(kAtt).norm() > 1.0);
+  }
+}
+
+TEST_CASE("what the linear rows of the axle's velocity leave out is what drawn errors show") {
+  constexpr int kDraws = 40'000;
+  test::RandomNavigationState random(5);
+  for (int trial = 0; trial < 4; ++trial) {
+    Mean x = random.mean(0.3);
+    x.wheel_scale = 0.0;
+    x.p_imu_axle.setZero();
+    x.nav.velocity = x.nav.q_level_imu * (vehicle::R_imu_vehicle(x.mounting) * Eigen::Vector3d(9.0, 0.0, 0.0));
+    // Correlated errors of the velocity, the heading and the mounting's yaw.
+    Eigen::Matrix<double, kBaseSize, 5> root = Eigen::Matrix<double, kBaseSize, 5>::Zero();
+    for (int i = 0; i < 5; ++i) {
+      root.block<3, 1>(kVel, i) = random.vector(0.3);
+      root(kAtt + 2, i) = random.number(0.05);
+      root(kMounting + 1, i) = random.number(0.03);
+    }
+    State state = with_mean(x, x.nav.position);
+    state.P() = (root * root.transpose()).topLeftCorner(state.P().rows(), state.P().cols());
+    const SecondOrder expected = second_order(state);
+    const Measurement<1> rows[] = {wheel_speed(state, {}, 0.0, 1.0, 0.0), nonholonomic(state, {}, 1, 1.0),
+                                   nonholonomic(state, {}, 2, 1.0)};
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero(), squares = sum;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      BaseVector d = BaseVector::Zero();
+      for (int i = 0; i < 5; ++i) d += random.number(1.0) * root.col(i);
+      const State drawn = with_mean(retract(x, d, x.nav.position), x.nav.position);
+      Eigen::Vector3d left(wheel_speed(drawn, {}, 0.0, 1.0, 0.0).residual(0),
+                           nonholonomic(drawn, {}, 1, 1.0).residual(0), nonholonomic(drawn, {}, 2, 1.0).residual(0));
+      for (int axis = 0; axis < 3; ++axis)
+        left(axis) = rows[axis].residual(0) - left(axis) - rows[axis].H.row(0).dot(d.head<kWithoutCamera>());
+      sum += left;
+      squares += left.cwiseAbs2();
+    }
+    const Eigen::Vector3d mean = sum / kDraws, variance = squares / kDraws - mean.cwiseAbs2();
+    CAPTURE(mean.transpose(), expected.mean.transpose(), variance.transpose(), expected.variance.transpose());
+    for (int axis = 0; axis < 3; ++axis) {
+      // Five sigmas of the drawn mean, and what the third and fourth order of the errors add.
+      const double slack = 5.0 * std::sqrt(variance(axis) / kDraws) + 0.02 * std::abs(expected.mean(0)) + 1e-9;
+      CHECK(std::abs(mean(axis) - expected.mean(axis)) < slack);
+      CHECK(std::abs(variance(axis) - expected.variance(axis)) < 0.25 * variance.x() + 1e-9);
+    }
+    // Teeth: without, or with the sign wrong, it would be another.
+    CHECK(std::abs(mean.x()) > 5.0 * std::sqrt(variance.x() / kDraws) + 0.1 * std::abs(expected.mean.x()));
+    CHECK(std::abs(mean.x() + expected.mean.x()) > 1.5 * std::abs(expected.mean.x()));
   }
 }

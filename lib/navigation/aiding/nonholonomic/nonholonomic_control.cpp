@@ -1,6 +1,7 @@
 #include "navigation/aiding/nonholonomic/nonholonomic_control.h"
 
 #include "navigation/aiding/nonholonomic/nonholonomic_model.h"
+#include "navigation/aiding/second_order.h"
 
 namespace roadfix::navigation {
 
@@ -21,9 +22,12 @@ bool NonholonomicControl::due(int axis, int64_t t_us) {
   if (!config_.sources.nonholonomic) return false;
   int64_t& next = next_us_[static_cast<size_t>(axis - 1)];
   if (t_us < next) return false;
-  const double interval = axis == 1 ? config_.aiding.lateral_interval : config_.aiding.vertical_interval;
-  next = t_us + static_cast<int64_t>(1e6 * interval) - kDueEarly_us;
+  next = t_us + static_cast<int64_t>(1e6 * interval(axis)) - kDueEarly_us;
   return true;
+}
+
+double NonholonomicControl::interval(int axis) const {
+  return axis == 1 ? config_.aiding.lateral_interval : config_.aiding.vertical_interval;
 }
 
 double NonholonomicControl::sigma(const Filter& filter, int axis) const {
@@ -32,7 +36,8 @@ double NonholonomicControl::sigma(const Filter& filter, int axis) const {
 
 AidingRecord NonholonomicControl::use(Filter& filter, int axis, bool learn) {
   const double std = sigma(filter, axis), acceleration = acceleration_of(filter, axis);
-  const Measurement<1> m = nonholonomic(filter.state(), filter.motion(), axis, std);
+  Measurement<1> m = nonholonomic(filter.state(), filter.motion(), axis, std);
+  if (learn) add_second_order(m, filter, axis, 1.0, interval(axis));
   const AidingRecord r = filter.fuse(AidingSource::kNonholonomic, filter.state().x.t_us, m, gates_.nis[1]);
   if (learn && filter.state().x.nav.velocity.norm() > kLearnSpeed && r.status != AidingStatus::kBadInput)
     (axis == 1 ? lateral_ : vertical_)
@@ -42,8 +47,9 @@ AidingRecord NonholonomicControl::use(Filter& filter, int axis, bool learn) {
 }
 
 AidingRecord NonholonomicControl::try_on(Filter& filter, int axis) const {
-  return filter.fuse(AidingSource::kNonholonomic, filter.state().x.t_us,
-                     nonholonomic(filter.state(), filter.motion(), axis, sigma(filter, axis)), Gates::open().nis[1]);
+  Measurement<1> m = nonholonomic(filter.state(), filter.motion(), axis, sigma(filter, axis));
+  add_second_order(m, filter, axis, 1.0, interval(axis));
+  return filter.fuse(AidingSource::kNonholonomic, filter.state().x.t_us, m, Gates::open().nis[1]);
 }
 
 }  // namespace roadfix::navigation

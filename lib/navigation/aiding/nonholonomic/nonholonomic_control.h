@@ -30,6 +30,7 @@ class NonholonomicControl {
 
  private:
   [[nodiscard]] double sigma(const Filter& filter, int axis) const;
+  [[nodiscard]] double interval(int axis) const;  ///< s between two uses
 
   NavigationConfig config_;
   Gates gates_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "navigation/aiding/axle_rows.h"
+#include "navigation/aiding/second_order.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_model.h"
 #include "vehicle/axle_speed.h"
 
@@ -17,25 +18,27 @@ constexpr double kSoon = 0.45, kLater = 5.0;  // s
 constexpr double kTyre = 0.1, kMost = 0.5;
 constexpr double kSlow = 2.0;  // m/s, below which a factor does not show
 
-std::optional<Measurement<1>> measurement(const Filter& filter, const Queued& wheels) {
+std::optional<Measurement<1>> measurement(const Filter& filter, const Queued& wheels, double interval) {
   const double ahead = wheels.ahead(filter.state().x);
   const AxleRows axle(filter.state(), filter.motion(), ahead);
   const vehicle::AxleSpeed told{wheels.value.x(), 0.0, wheels.direction, {}, {}, 0.0};
   const std::optional<double> speed = vehicle::signed_speed(told, axle.value.x());
   if (!speed) return std::nullopt;
-  return wheel_speed(filter.state(), filter.motion(), *speed, std::sqrt(wheels.cov(0, 0)), ahead);
+  Measurement<1> m = wheel_speed(filter.state(), filter.motion(), *speed, std::sqrt(wheels.cov(0, 0)), ahead);
+  add_second_order(m, filter, 0, 1.0 + filter.state().x.wheel_scale, interval);
+  return m;
 }
 
 }  // namespace
 
 AidingRecord WheelSpeedControl::try_on(Filter& filter, const Queued& wheels) const {
-  const std::optional<Measurement<1>> m = measurement(filter, wheels);
+  const std::optional<Measurement<1>> m = measurement(filter, wheels, interval_);
   if (!m) return record_of(AidingSource::kWheelSpeed, AidingStatus::kNotReady, wheels.t_us);
   return filter.fuse(AidingSource::kWheelSpeed, wheels.t_us, *m, Gates::open().nis[1]);
 }
 
 AidingRecord WheelSpeedControl::use(Filter& filter, const Queued& wheels) {
-  const std::optional<Measurement<1>> m = measurement(filter, wheels);
+  const std::optional<Measurement<1>> m = measurement(filter, wheels, interval_);
   if (!m) return record_of(AidingSource::kWheelSpeed, AidingStatus::kNotReady, wheels.t_us);
   const AidingRecord r = filter.fuse(AidingSource::kWheelSpeed, wheels.t_us, *m, gates_.nis[1]);
   if (r.status == AidingStatus::kGated && detects_steps_)

@@ -9,7 +9,9 @@ namespace roadfix::navigation {
 class WheelSpeedControl {
  public:
   explicit WheelSpeedControl(const NavigationConfig& config)
-      : detects_steps_(config.aiding.step_detection), gates_(config.aiding.gate_sigma) {}
+      : detects_steps_(config.aiding.step_detection),
+        interval_(config.aiding.wheel_interval),
+        gates_(config.aiding.gate_sigma) {}
 
   AidingRecord use(Filter& filter, const Queued& wheels);
   AidingRecord try_on(Filter& filter, const Queued& wheels) const;
@@ -24,6 +26,7 @@ class WheelSpeedControl {
   void widen_scale(Filter& filter, const Queued& wheels, const AidingRecord& r);
 
   bool detects_steps_;
+  double interval_;  // s
   Gates gates_;
   int64_t rejected_since_us_ = 0;
   double excess_sum_ = 0.0, excess_least_ = 0.0, excess_most_ = 0.0;  // relative, of rejected speeds in a row
