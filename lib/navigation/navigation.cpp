@@ -8,6 +8,7 @@
 #include "navigation/input_adapter.h"
 #include "navigation/motion/road_level.h"
 #include "stream/state_bytes.h"
+#include "vehicle/axle_velocity.h"
 
 namespace roadfix::navigation {
 
@@ -23,6 +24,7 @@ constexpr double kClipTime = 1.0;            // s that a turn beyond the gyro's 
 constexpr double kTruthShown = 3.0;          // s since the last position, to learn the constraint's noise
 constexpr double kWheelsSilent = 0.3;        // s without a wheel speed, after which the constraint keeps its own time
 constexpr double kMoving = 1.0;              // m/s
+constexpr double kReverseTime = 3.0;         // s of driving backwards, faster than a car goes in reverse
 constexpr double kWheelPeriodSlack = 0.005;  // s
 constexpr double kPredictorSpan = 1.0;       // s that one transition of the output covariance may cover
 
@@ -212,6 +214,7 @@ void Navigation::step(const ImuSample& imu) {
   if (phase_ == Phase::kDone) {
     filter_->predict(imu, dt, noise_over(imu.t_us, dt));
     step_aligned(imu, block_done);
+    if (heads_backwards()) return align_again();
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == Phase::kHeading) {
     step_heading(imu, dt, block_done);
@@ -285,6 +288,7 @@ void Navigation::end_alignment() {
   if (config_.aiding.step_detection) filter_->watch_for_steps();
   all.stop();
   phase_ = Phase::kDone;
+  backwards_since_us_ = last_step_us_;
   predictor_stale_ = true;
   if (abandoned_) count_reset(*abandoned_, filter_->state().x);
 }
@@ -327,6 +331,17 @@ void Navigation::step_aligned(const ImuSample& imu, bool block_done) {
     note(aiding_.zero_motion().use_rate(filter, standstill_.block(), true));
   }
   if (camera_) use_pictures(imu.t_us);
+}
+
+/// Hardly a car drives backwards so fast for so long, (N.7.4): its heading is the opposite one. Wheels that agree know better.
+bool Navigation::heads_backwards() {
+  const Mean& x = filter_->state().x;
+  const Eigen::Vector3d forward = x.nav.q_level_imu * (vehicle::R_imu_vehicle(x.mounting) * Eigen::Vector3d::UnitX());
+  const bool wheels =
+      seconds_between(used_at_us_[static_cast<size_t>(AidingSource::kWheelSpeed)], x.t_us) < kWheelsSilent;
+  if (local() || wheels || forward.dot(x.nav.velocity) > -HeadingHypotheses::kReverseSpeed)
+    backwards_since_us_ = x.t_us;
+  return seconds_between(backwards_since_us_, x.t_us) > kReverseTime;
 }
 
 bool Navigation::standing(const Filter& filter, bool block_done) const {
@@ -456,7 +471,7 @@ void Navigation::serialise(Archive& a) {
       a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
   a(phase_, predictor_stale_, lag_us_, last_step_us_, last_wheel_us_, wheels_at_us_, last_magnetic_us_, last_fix_us_,
     last_fix_.latitude, last_fix_.longitude, last_fix_.height, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
-    bad_imu_, gaps_, steps_);
+    bad_imu_, gaps_, steps_, backwards_since_us_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

@@ -19,7 +19,6 @@ namespace {
 constexpr double kMostNis = 50.0;
 // Above this speed hardly a car is in reverse. With the constraint a heading and its opposite look alike until the car
 // turns or brakes hard.
-constexpr double kReverseSpeed = 4.0;             // m/s
 constexpr double kReverseLogProbability = -12.0;  // log of 6e-6
 // A car that seems to stand as it was parked: how often it was turned all the same, and by how much it may be off.
 constexpr double kTurned = 1e-4;

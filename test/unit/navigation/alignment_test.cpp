@@ -42,6 +42,7 @@ navtest::Samples positions_only(double from_s, size_t every) {
 struct Aligned {
   double after_s = 1e9;        ///< from the first sample to the first valid pose of the (last) alignment
   double yaw_error_deg = 1e9;  ///< at the end
+  int resets = 0;
 };
 
 Aligned drive_it(const navtest::Samples& samples, double duration_s) {
@@ -62,6 +63,7 @@ Aligned drive_it(const navtest::Samples& samples, double duration_s) {
     over = true;
     const NavigationOutput o = f.output();
     out.yaw_error_deg = std::abs(navtest::error_of(f, o.odometry, city())(5)) / kDegree;
+    out.resets = o.reset_counter;
   });
   return out;
 }
@@ -81,6 +83,21 @@ TEST_CASE("a receiver of 5 Hz without velocity is enough to align") {
   CHECK(standing.yaw_error_deg < 1.0);
   const Aligned moving = drive_it(positions_only(12.0, 1), 40.0);
   CHECK(moving.yaw_error_deg < 1.0);
+}
+
+TEST_CASE("a start that was told the opposite heading heads for the truth") {
+  navtest::Samples wrong = positions_only(12.0, 1);
+  const Odometry at_start = city().truth_at(wrong.gnss.front().t_us);
+  const Eigen::Vector3d forward = at_start.T_frame_vehicle.q * Eigen::Vector3d::UnitX();
+  const double opposite = std::atan2(-forward.y(), -forward.x());
+  for (size_t i = 0; i < 10; ++i) wrong.gnss[i].heading = GnssHeading{0.5 * kPi - opposite, 0.5 * kDegree};
+  const Aligned a = drive_it(wrong, 120.0);
+  CAPTURE(a.after_s);
+  CHECK(a.resets >= 1);
+  CHECK(a.yaw_error_deg < 1.0);
+  // Teeth: told the right one it needs no second start.
+  for (size_t i = 0; i < 10; ++i) wrong.gnss[i].heading->heading += kPi;
+  CHECK(drive_it(wrong, 120.0).resets == 0);
 }
 
 namespace {
