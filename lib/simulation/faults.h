@@ -22,7 +22,6 @@ enum class FaultKind {
   kRepeat,
   kStuck,
   kClock,
-  kDrift,
   kJitter,
   kDelay,
   // Of some.
@@ -45,6 +44,8 @@ enum class FaultKind {
   kWhite,
   kOcclude,
   kCorrupt,
+  // Of every sensor again: a kind's number is part of its seed, so that new ones come last.
+  kDrift,
 };
 
 struct FaultParameter {
