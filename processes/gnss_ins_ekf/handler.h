@@ -18,7 +18,7 @@ enum class InsFilter { kGnssIns, kNavigation };
 struct GnssInsProcessConfig {
   double publish_period = 0.01;  ///< s, of data time
   double status_period = 0.2;    ///< s, of data time
-  InsFilter filter = InsFilter::kGnssIns;
+  InsFilter filter = InsFilter::kNavigation;
   GnssInsTuning tuning;                     ///< of lib/gnss_ins
   navigation::NavigationTuning navigation;  ///< of lib/navigation
 };

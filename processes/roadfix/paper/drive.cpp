@@ -26,6 +26,13 @@ const std::map<std::string, PoseMaker>& pose_makers() {
   return kMakers;
 }
 
+/// What an estimator hears of the other one.
+const std::map<std::string, std::string>& other_estimators() {
+  static const std::map<std::string, std::string> kOthers = {{"gnss_ins_ekf", "VO_FEATURES"},
+                                                             {"vo_tracker", "POSE_INS"}};
+  return kOthers;
+}
+
 }  // namespace
 
 ScratchFolder::ScratchFolder() {
@@ -72,7 +79,8 @@ std::filesystem::path with_poses_of(const std::vector<std::string>& stages, cons
   const std::filesystem::path out = scratch / "poses.lcm";
   std::vector<std::unique_ptr<Stage>> made = make_stages(stages, request.vehicle);
   for (std::unique_ptr<Stage>& stage : made) {
-    if (request.independent && stage->spec().name == "vo_tracker") stage = deaf_to("POSE_INS", std::move(stage));
+    const auto other = other_estimators().find(stage->spec().name);
+    if (request.independent && other != other_estimators().end()) stage = deaf_to(other->second, std::move(stage));
   }
   replay_for_paper(request.drive, out, std::move(made), request.progress);
   return out;

@@ -22,7 +22,7 @@ struct PaperRequest {
   std::filesystem::path drive;
   std::filesystem::path vehicle;               ///< its configuration folder
   bool again = false;                          ///< run the estimators although the drive has their poses
-  bool independent = false;                    ///< vision hears nothing of the INS
+  bool independent = false;                    ///< vision and the INS hear nothing of each other
   double slow_window = 0.0;                    ///< s, of `paper c`: vision is also shown without what is slower; 0: not
   double turn_threshold = 0.0;                 ///< rad/s, the yaw rate that counts as a turn
   std::function<void(double share)> progress;  ///< of what takes long
