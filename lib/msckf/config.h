@@ -74,7 +74,7 @@ struct MsckfAiding {
   double planar_slack = 0.05;        ///< rad, standard deviation of the road's slope and of body lean
   double planar_interval = 5.0;      ///< s: slopes are correlated
   double gate_sigma = 5.0;           ///< of each of these, Gaussian
-  double wheel_scale_walk = 1.3e-5;  ///< 1/sqrt(s): a tyre that warms up, 1e-4 in a minute (gnss_ins (M.16))
+  double wheel_scale_walk = 1.3e-5;  ///< 1/sqrt(s): a tyre that warms up, 1e-4 in a minute (navigation (N.2.5))
   double mounting_walk = 1.0e-5;     ///< rad/sqrt(s)
 };
 

@@ -3,31 +3,26 @@
 #include <roadfix/imu_t.hpp>
 #include <roadfix/mag_t.hpp>
 #include <roadfix/state_t.hpp>
+#include <roadfix/vo_features2_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
 #include "bus/run/publish_slot.h"
 #include "bus/sample_codec.h"
+#include "bus/track_codec.h"
 #include "bus/types/message.h"
 #include "config/config.h"
-#include "geometry/frames.h"
-#include "gnss_ins/gnss_ins.h"
 #include "gnss_ins_ekf/messages.h"
+#include "gnss_ins_ekf/vehicle_facts.h"
+#include "navigation/navigation.h"
 #include "stream/state_bytes.h"
 
 namespace roadfix {
 
 namespace {
 
-constexpr double kMicrotesla = 1e-6;
-// s, where the calibration says nothing: fixes stamped when they came out of the receiver are 20 to 100 ms old. Nought
-// would claim that they are not, and the delay would pass for a scale or a mounting error.
-constexpr double kUnknownLatency = 0.05;
-// s, of the IMU's clock against the receiver's, likewise: drivers stamp with the arrival on another computer's clock.
-constexpr double kUnknownOffset = 0.05;
-// s, likewise of wheel speeds: a control unit filters them and sends them every 10 to 20 ms.
-constexpr double kUnknownWheelLatency = 0.03;
+constexpr int64_t kTracksLateness_us = 200'000;  // exposure, transport, tracking
 
-enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4 };
+enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4, kTracks = 5 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
 class GnssInsStage final : public Stage {
@@ -37,10 +32,11 @@ class GnssInsStage final : public Stage {
         calibration_(calibration_text(calibration)),
         pose_slot_(config.publish_period),
         status_slot_(config.status_period) {
-    static_cast<GnssInsTuning&>(filter_config_) = config.tuning;
-    filter_config_.vehicle = gnss_ins_vehicle(calibration);
+    static_cast<navigation::NavigationTuning&>(filter_config_) = config.navigation;
+    filter_config_.facts = vehicle_facts(calibration);
     // Without the declination a magnetic heading is not a heading.
-    if (!calibration.sensors.mag || !calibration.sensors.mag->declination_deg) filter_config_.aiding.use_mag = false;
+    if (!calibration.sensors.mag || !calibration.sensors.mag->declination_deg)
+      filter_config_.sources.magnetic_heading = false;
     filter_.emplace(filter_config_);
     spec_.name = "gnss_ins_ekf";
     spec_.inputs = {{"IMU", "imu_t", 0, 0},
@@ -48,8 +44,11 @@ class GnssInsStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
-    spec_.state_layout = 14;
-    spec_.clocks = {{kImu, 200'000}};
+    if (filter_config_.sources.camera && filter_config_.facts.camera)
+      spec_.inputs.push_back({"VO_FEATURES", "vo_features2_t", kTracksLateness_us, 0});
+    spec_.state_layout = 20;
+    // A car without an IMU is driven by its wheels.
+    spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
   }
 
@@ -69,16 +68,24 @@ class GnssInsStage final : public Stage {
       case kWheels:
         filter_->add(wheel_sample(decode<wheels_t>(m.bytes)), m.seq);
         break;
+      case kTracks:
+        filter_->add(track_picture(decode<vo_features2_t>(m.bytes)), m.seq);
+        break;
       default:
         filter_->add(mag_sample(decode<mag_t>(m.bytes)), m.seq);
         break;
     }
   }
 
-  void on_clock(const Message& m) override { (void)filter_->see(imu_sample(decode<imu_t>(m.bytes))); }
+  void on_clock(const Message& m) override {
+    if (m.input == kImu) (void)filter_->see(imu_sample(decode<imu_t>(m.bytes)));
+    if (m.input == kWheels) (void)filter_->see(wheel_sample(decode<wheels_t>(m.bytes)));
+    waits_for_imu_ = m.input != kImu && filter_->has_imu();
+  }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
-    for (const AidingRecord& record : filter_->records()) {
+    if (waits_for_imu_) return;
+    for (const navigation::AidingRecord& record : filter_->records()) {
       aiding_t message = aiding(record);
       outputs.publish(kAiding, message);
     }
@@ -89,13 +96,13 @@ class GnssInsStage final : public Stage {
       outputs.publish(kPose, pose);
     }
     if (status_slot_.due(now_utime)) {
-      ins_status_t status = ins_status(filter_->status(), filter_->core(), filter_config_.vehicle);
+      ins_status_t status = ins_status(filter_->status(), filter_->filter(), filter_config_.facts);
       outputs.publish(kStatus, status);
     }
   }
 
   void digest(Digest& digest) const override {
-    if (const InsCore* core = filter_->core()) core->digest(digest);
+    if (const navigation::Filter* filter = filter_->filter()) filter->digest(digest);
   }
 
   [[nodiscard]] std::vector<uint8_t> save() const override {
@@ -120,7 +127,7 @@ class GnssInsStage final : public Stage {
   }
 
   [[nodiscard]] std::vector<uint8_t> memory() const override {
-    std::optional<InsMemory> memory = filter_->memory();
+    std::optional<navigation::Memory> memory = filter_->memory();
     return memory ? bytes_of(*memory) : std::vector<uint8_t>();
   }
 
@@ -131,22 +138,22 @@ class GnssInsStage final : public Stage {
  private:
   /// Where the newest samples were refused (no numbers, beyond any car), the state is of an earlier time: it must not
   /// go out under this stamp as if it were new.
-  GnssInsOutput output_of(int64_t now_utime) {
-    GnssInsOutput output = filter_->output();
+  navigation::NavigationOutput output_of(int64_t now_utime) {
+    navigation::NavigationOutput output = filter_->output();
     if (output.odometry.t_us >= now_utime || output.odometry.validity == Validity::kInvalid) return output;
     output.odometry.validity = Validity::kInvalid;
-    output.reason = "the newest IMU samples are unusable";
+    output.reason = "the newest samples are unusable";
     return output;
   }
 
-  static std::vector<uint8_t> bytes_of(InsMemory& memory) {
+  static std::vector<uint8_t> bytes_of(navigation::Memory& memory) {
     StateArchiveOut out;
     memory.serialise(out);
     return out.out.take();
   }
 
   void recall(const std::vector<uint8_t>& bytes) {
-    InsMemory memory;
+    navigation::Memory memory;
     if (bytes.size() != bytes_of(memory).size()) return;  // written by another version
     StateArchiveIn in{StateReader(bytes)};
     memory.serialise(in);
@@ -155,53 +162,16 @@ class GnssInsStage final : public Stage {
 
   GnssInsProcessConfig config_;
   std::string calibration_;
-  GnssInsConfig filter_config_;
+  navigation::NavigationConfig filter_config_;
   StageSpec spec_;
-  std::optional<GnssIns> filter_;
+  std::optional<navigation::Navigation> filter_;
   PublishSlot pose_slot_, status_slot_;
+  bool waits_for_imu_ = false;  // this tick came from another clock
 };
 
 }  // namespace
 
-GnssInsVehicle gnss_ins_vehicle(const Calibration& calibration) {
-  GnssInsVehicle v;
-  v.position_latency_std = v.velocity_latency_std = kUnknownLatency;
-  if (const auto& imu = calibration.sensors.imu) {
-    take_known_noise(*imu, v);
-  }
-  if (const auto& gnss = calibration.sensors.gnss) {
-    take_known(gnss->position_latency_std, v.position_latency_std);
-    // One receiver, one way through it, unless the calibration knows better.
-    v.velocity_latency_std = gnss->velocity_latency_std.value_or(v.position_latency_std);
-  }
-  // The latency's uncertainty is between the two clocks already; where none is given the IMU's defines time.
-  const bool latency_told = calibration.sensors.gnss && calibration.sensors.gnss->position_latency_std;
-  const std::optional<double> offset_told =
-      calibration.sensors.imu ? calibration.sensors.imu->time_offset_std : std::nullopt;
-  v.time_offset_std = offset_told.value_or(latency_told ? kUnknownOffset : 0.0);
-  if (const auto& wheels = calibration.sensors.wheels) {
-    take_known(wheels->speed_scale_std, v.wheel_scale_std);
-    take_known(wheels->speed_noise, v.wheel_noise);
-    v.wheel_latency_std = wheels->latency_std.value_or(kUnknownWheelLatency);
-    take_known(wheels->track_width, v.track_width);
-  }
-  const PlaceOnVehicle antenna = calibration.antenna(), axle = calibration.rear_axle();
-  v.p_imu_antenna = antenna.p;
-  v.p_imu_antenna_std = antenna.std;
-  v.p_imu_axle = axle.p;
-  v.p_imu_axle_std = axle.std;
-  if (const auto& mag = calibration.sensors.mag) {
-    if (mag->declination_deg) v.magnetic_declination = *mag->declination_deg * kDegree;
-    if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;
-    take_known(mag->soft_iron, v.soft_iron);
-  }
-  v.mounting = calibration.turn_to_forward();
-  if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
-  return v;
-}
-
 std::unique_ptr<Stage> make_gnss_ins_ekf(const Calibration& calibration, const GnssInsProcessConfig& config) {
-  if (config.filter == InsFilter::kNavigation) return make_navigation_stage(calibration, config);
   return std::make_unique<GnssInsStage>(calibration, config);
 }
 

@@ -1,5 +1,6 @@
 #include "gnss_ins_ekf/messages.h"
 
+#include <array>
 #include <cmath>
 
 #include "bus/sample_codec.h"
@@ -42,18 +43,19 @@ void copy(const Eigen::Vector3d& from, double (&to)[3]) {
   for (int i = 0; i < 3; ++i) to[i] = from(i);
 }
 
-double std_of(const ErrorMatrix& P, int i) { return std::sqrt(P(i, i)); }
+double std_of(const Eigen::MatrixXd& P, int i) { return std::sqrt(P(i, i)); }
 
-void fill_estimates(const InsCore& core, const GnssInsVehicle& vehicle, ins_status_t& m) {
-  const NavState& x = core.state();
-  const ErrorMatrix P = core.covariance();
+void fill_estimates(const navigation::Filter& filter, const navigation::VehicleFacts& vehicle, ins_status_t& m) {
+  using namespace navigation;
+  const Mean& x = filter.state().x;
+  const Eigen::MatrixXd& P = filter.state().P();
   copy(x.gyro_bias, m.gyro_bias_radps);
   copy(x.accel_bias, m.accel_bias_mps2);
   for (int i = 0; i < 3; ++i) {
     m.gyro_bias_std_radps[i] = std_of(P, kGyroBias + i);
     m.accel_bias_std_mps2[i] = std_of(P, kAccelBias + i);
   }
-  m.wheel_scale = 1.0 + x.wheel_scale;
+  m.wheel_scale = 1.0 / (1.0 + x.wheel_scale);
   m.wheel_scale_std = std_of(P, kWheelScale);
   copy(Eigen::Vector3d(0.0, x.mounting.x(), x.mounting.y()), m.mounting_rad);
   m.mounting_std_rad[0] = vehicle.mounting_std.x();
@@ -69,11 +71,34 @@ void fill_estimates(const InsCore& core, const GnssInsVehicle& vehicle, ins_stat
   m.wheel_latency_std_s = std_of(P, kWheelLatency);
 }
 
-int8_t pose_state(const GnssInsOutput& output) {
+/// AidingSource in aiding_t's words and as a bit of ins_status_t's, AidingStatus in aiding_t's: by name, since those of the
+/// library may come in another order.
+constexpr std::array<int8_t, navigation::kAidingSources> kSources = {
+    aiding_t::SOURCE_GNSS_POSITION, aiding_t::SOURCE_GNSS_VELOCITY, aiding_t::SOURCE_GNSS_HEADING,
+    aiding_t::SOURCE_WHEEL_SPEED,   aiding_t::SOURCE_NO_SIDESLIP,   aiding_t::SOURCE_ZERO_VELOCITY,
+    aiding_t::SOURCE_ZERO_RATE,     aiding_t::SOURCE_MAG_HEADING,   aiding_t::SOURCE_WHEEL_YAW_RATE,
+    aiding_t::SOURCE_CAMERA_TRACKS, aiding_t::SOURCE_PRIOR_POSE};
+constexpr std::array<int32_t, navigation::kAidingSources> kAided = {
+    ins_status_t::AIDED_GNSS_POSITION, ins_status_t::AIDED_GNSS_VELOCITY, ins_status_t::AIDED_GNSS_HEADING,
+    ins_status_t::AIDED_WHEEL_SPEED,   ins_status_t::AIDED_NO_SIDESLIP,   ins_status_t::AIDED_ZERO_VELOCITY,
+    ins_status_t::AIDED_ZERO_RATE,     ins_status_t::AIDED_MAG_HEADING,   ins_status_t::AIDED_WHEEL_YAW_RATE,
+    ins_status_t::AIDED_CAMERA_TRACKS, ins_status_t::AIDED_PRIOR_POSE};
+constexpr std::array<int8_t, 7> kStatuses = {
+    aiding_t::STATUS_ACCEPTED,    aiding_t::STATUS_GATED, aiding_t::STATUS_NOT_READY, aiding_t::STATUS_BAD_INPUT,
+    aiding_t::STATUS_BAD_QUALITY, aiding_t::STATUS_RESET, aiding_t::STATUS_DISABLED};
+
+int32_t aided_by(int sources) {
+  int32_t bits = 0;
+  for (size_t i = 0; i < kAided.size(); ++i)
+    if ((sources >> i & 1) != 0) bits |= kAided[i];
+  return bits;
+}
+
+int8_t pose_state(const navigation::NavigationOutput& output) {
   if (output.odometry.validity == Validity::kValid) return pose_t::STATE_RUNNING;
   if (output.odometry.validity == Validity::kCoasting) return pose_t::STATE_WEAK;
-  if (output.phase == AlignmentPhase::kDone) return pose_t::STATE_LOST;
-  return output.phase == AlignmentPhase::kWaiting ? pose_t::STATE_WAITING : pose_t::STATE_ALIGNING;
+  if (output.phase == navigation::Phase::kDone) return pose_t::STATE_LOST;
+  return output.phase == navigation::Phase::kWaiting ? pose_t::STATE_WAITING : pose_t::STATE_ALIGNING;
 }
 
 }  // namespace
@@ -96,9 +121,9 @@ GnssFix gnss_fix(const gnss_t& m) {
   return f;
 }
 
-void fill_ins_pose(const GnssInsOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose) {
+void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose) {
   fill_pose(output.odometry, pose);
-  pose.frame = pose_t::FRAME_ENU;
+  pose.frame = output.local ? pose_t::FRAME_LOCAL : pose_t::FRAME_ENU;
   if (anchor) {
     pose.anchor_lat_deg = anchor->latitude / kDegree;
     pose.anchor_lon_deg = anchor->longitude / kDegree;
@@ -116,28 +141,29 @@ void fill_ins_pose(const GnssInsOutput& output, const std::optional<Geodetic>& a
   pose.reset_delta_q_wxyz[3] = output.reset_delta.q.z();
 }
 
-ins_status_t ins_status(const GnssInsStatus& status, const InsCore* core, const GnssInsVehicle& vehicle) {
+ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,
+                        const navigation::VehicleFacts& vehicle) {
   ins_status_t m{};
   m.alignment = static_cast<int8_t>(status.phase);
   m.waits_for = status.waits_for;
-  m.heading_confirmed = status.phase == AlignmentPhase::kDone;
-  m.aided_by = status.aided_by;
+  m.heading_confirmed = status.phase == navigation::Phase::kDone;
+  m.aided_by = aided_by(status.aided_by);
   m.coasting = status.coasting;
   m.coasting_since_utime = status.coasting_since_us;
   m.gnss_quality = static_cast<int8_t>(status.gnss_quality);
   m.gnss_reason = status.gnss_reason;
   m.wheel_scale = 1.0;
   m.wheel_scale_steps = status.wheel_scale_steps;
-  if (core != nullptr) fill_estimates(*core, vehicle, m);
+  if (filter != nullptr) fill_estimates(*filter, vehicle, m);
   return m;
 }
 
-aiding_t aiding(const AidingRecord& record) {
+aiding_t aiding(const navigation::AidingRecord& record) {
   aiding_t m{};
   m.measurement_utime = record.t_us;
   m.measurement_seq = record.id;
-  m.source = static_cast<int8_t>(record.source);
-  m.status = static_cast<int8_t>(record.status);
+  m.source = kSources[static_cast<size_t>(record.source)];
+  m.status = kStatuses[static_cast<size_t>(record.status)];
   m.nis = record.nis;
   m.dof = record.dof;
   const auto n = static_cast<size_t>(record.dof);

@@ -1,4 +1,4 @@
-/// Messages of the GNSS/INS process to and from lib/gnss_ins: units and enums, nothing else.
+/// Messages of the GNSS/INS process to and from lib/navigation: units and enums, nothing else.
 #pragma once
 
 #include <roadfix/aiding_t.hpp>
@@ -6,13 +6,14 @@
 #include <roadfix/ins_status_t.hpp>
 #include <roadfix/pose_t.hpp>
 
-#include "gnss_ins/gnss_ins.h"
+#include "navigation/navigation.h"
 
 namespace roadfix {
 
 GnssFix gnss_fix(const gnss_t& message);
-void fill_ins_pose(const GnssInsOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose);
-ins_status_t ins_status(const GnssInsStatus& status, const InsCore* core, const GnssInsVehicle& vehicle);
-aiding_t aiding(const AidingRecord& record);
+void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose);
+ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,
+                        const navigation::VehicleFacts& vehicle);
+aiding_t aiding(const navigation::AidingRecord& record);
 
 }  // namespace roadfix

@@ -14,8 +14,7 @@ SEEDS = 20
 SCENARIO = "tunnel_lit"
 CHANNEL = "POSE_INS"
 DRAWN = {"640x192": range(101, 111), "1241x376": range(101, 106)}  # as shipped, and the size of KITTI's pictures
-NAVIGATION = "filter: navigation\n"
-BLIND = NAVIGATION + "navigation: {sources: {camera: false}}\n"
+BLIND = "navigation: {sources: {camera: false}}\n"
 LIBRARIES = ("inertial", "vehicle", "navigation", "wheel", "slam", "fusion")
 
 
@@ -61,7 +60,7 @@ def drive(runs, size, seed, camera):
 
     def run():
         log, vehicle = drawn(runs, size, seed)
-        (vehicle / "gnss_ins_ekf.yaml").write_text(NAVIGATION if camera else BLIND)
+        (vehicle / "gnss_ins_ekf.yaml").write_text("" if camera else BLIND)
         folder = runs.folder("pictures") / f"demo_{size}_{seed}" / ("camera" if camera else "blind")
         folder.mkdir(exist_ok=True)
         out, report = folder / "out.lcm", folder / "report"
@@ -132,11 +131,9 @@ def tunables(runs):
 
 def malaga(runs):
     """Nine windows of 20 s without fixes, from second 14 on, against the fixes, the receiver's constant latency fitted."""
-    config = runs.folder("navigation_defaults")
-    (config / "gnss_ins_ekf.yaml").write_text(NAVIGATION)
     cut = ("cut_gnss_s=20", "every_s=100", "after_s=14", f"phase_s={','.join(str(i) for i in range(9))}")
     ends = []
-    for channels, _ in runs.recorded("vo_tracker,gnss_ins_ekf", "malaga07_part1", *cut, config=config, fit_latency=True):
+    for channels, _ in runs.recorded("vo_tracker,gnss_ins_ekf", "malaga07_part1", *cut, fit_latency=True):
         outages = channels[CHANNEL]["outages"]
         if outages["missing"]:
             raise Skipped("an outage ends without an estimate")
@@ -146,7 +143,6 @@ def malaga(runs):
 
 def first_valid_s(runs, log, vehicle, out):
     """From the log's first pose, whose car moves already, to the first valid one."""
-    (vehicle / "gnss_ins_ekf.yaml").write_text(NAVIGATION)
     runs.roadfix("replay", log, "--stages", "gnss_ins_ekf", "--config", vehicle, "--out", out)
     poses = out.with_suffix(".csv")
     runs.roadfix("export", out, "--channel", CHANNEL, "--format", "csv", "--out", poses)

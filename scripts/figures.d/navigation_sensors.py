@@ -15,12 +15,6 @@ LEVER_WRONG_M = (1.0, 0.0, 0.5)
 CAR_60S = (60, 60, 120, (0, 20, 40, 60, 80, 100))
 
 
-def defaults(runs):
-    config = runs.folder("navigation_defaults")
-    (config / "gnss_ins_ekf.yaml").write_text("filter: navigation\n")
-    return config
-
-
 def copied(runs, drive, name):
     """A copy of a recording's folder, to be changed."""
     folder = runs.folder("copies") / name
@@ -66,7 +60,7 @@ def without_imu_30s(runs):
 
 
 def potsdamer(runs):
-    return runs.scored(CHANNEL, STAGES, "potsdamer_part1", config=defaults(runs))
+    return runs.scored(CHANNEL, STAGES, "potsdamer_part1")
 
 
 def turn_on_ratio(runs):
@@ -84,7 +78,7 @@ def turn_on_ratio(runs):
         imu = imu.with_suffix("")
     changed_csv(imu, turn)
     changed_line(folder / "drive.yaml", "gyro_bias_std_radps: 3.5e-3", f"gyro_bias_std_radps: {TURN_ON_RADPS}")
-    with_bias, as_it_is = (runs.windows(CHANNEL, STAGES, drive, *CAR_60S, config=defaults(runs)) for drive in (str(folder), "car_0708"))
+    with_bias, as_it_is = (runs.windows(CHANNEL, STAGES, drive, *CAR_60S) for drive in (str(folder), "car_0708"))
     return with_bias / as_it_is
 
 
@@ -110,13 +104,13 @@ def smoothed_velocity_ratio(runs):
     for name, change in (("smoothed", smooth), ("no_velocity", drop)):
         folder = copied(runs, "car_0708", name)
         changed_csv(folder / "gnss.csv", change)
-        errors.append(runs.scored(CHANNEL, STAGES, str(folder), config=defaults(runs))["errors"]["horizontal_m"]["rmse"])
+        errors.append(runs.scored(CHANNEL, STAGES, str(folder))["errors"]["horizontal_m"]["rmse"])
     return errors[0] / errors[1]
 
 
 def sparse_fixes_valid(runs):
     """The receiver gives four fixes a second; one in twenty is kept."""
-    return runs.scored(CHANNEL, STAGES, "car_0708", "gnss_every=20", "score_skip_s=60", config=defaults(runs))["availability"]["valid"]
+    return runs.scored(CHANNEL, STAGES, "car_0708", "gnss_every=20", "score_skip_s=60")["availability"]["valid"]
 
 
 def late_return_s(runs):
@@ -124,7 +118,7 @@ def late_return_s(runs):
     length, first, every, phases = 30, 60, 90, (0, 15, 30, 45, 60, 75)
     words = ("gnss_every=4", f"cut_gnss_s={length}", f"every_s={every}", f"after_s={first}", f"phase_s={','.join(map(str, phases))}")
     times = []
-    for channels, folder in runs.recorded(STAGES, "car_0708", *words, config=defaults(runs)):
+    for channels, folder in runs.recorded(STAGES, "car_0708", *words):
         with open(folder / "report" / f"{CHANNEL}_errors.csv", newline="") as file:
             rows = [(int(row["utime_us"]), math.hypot(float(row["longitudinal_m"]), float(row["lateral_m"]))) for row in csv.DictReader(file)]
         for outage in channels[CHANNEL]["outages"]["each"]:
@@ -137,7 +131,7 @@ def lever_wrong_3sigma(runs):
     folder = copied(runs, "adis_semisim", "lever_wrong")
     wrong = [round(true + off, 3) for true, off in zip((-0.073, -0.302, -0.087), LEVER_WRONG_M)]
     changed_line(folder / "drive.yaml", "lever_arm_body_m: [-0.073, -0.302, -0.087]", f"lever_arm_body_m: {wrong}")
-    return runs.scored(CHANNEL, STAGES, str(folder), config=defaults(runs))["honesty"]["position_m"]["within_3sigma"]
+    return runs.scored(CHANNEL, STAGES, str(folder))["honesty"]["position_m"]["within_3sigma"]
 
 
 MEASUREMENTS = {

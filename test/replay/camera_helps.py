@@ -18,8 +18,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "support"))
 import lcm_log  # noqa: E402
 
-NAVIGATION = "filter: navigation\n"
-BLIND = NAVIGATION + "navigation: {sources: {camera: false}}\n"
+DEFAULT = ""
+BLIND = "navigation: {sources: {camera: false}}\n"
 DARK_AFTER_US = 35_000_000  # five seconds of tunnel
 TURN = [math.cos(math.radians(1)), 0.0, 0.0, math.sin(math.radians(1))]  # half of two degrees, about the vertical
 
@@ -101,12 +101,12 @@ def main(roadfix, vehicle, log):
         car = Car(roadfix, vehicle, log, folder)
         without = car.tunnel("without", BLIND)
         checks = {
-            "the camera helps or does nothing": car.tunnel("with", NAVIGATION) <= without,
-            "it goes dark in the tunnel": car.tunnel("dark", NAVIGATION, log=car.dark) <= 1.05 * without,
-            "0.1 s late": car.tunnel("late", NAVIGATION, late) <= 1.05 * without,
-            "turned by two degrees": car.tunnel("turned", NAVIGATION, turned) <= 1.05 * without,
+            "the camera helps or does nothing": car.tunnel("with", DEFAULT) <= without,
+            "it goes dark in the tunnel": car.tunnel("dark", DEFAULT, log=car.dark) <= 1.05 * without,
+            "0.1 s late": car.tunnel("late", DEFAULT, late) <= 1.05 * without,
+            "turned by two degrees": car.tunnel("turned", DEFAULT, turned) <= 1.05 * without,
             # The comparison can fail: called exact, a mounting that is not is believed.
-            "turned, called exact": car.tunnel("exact", NAVIGATION + "navigation: {camera: {turn_floor_rad: 0}}\n", turned) > 1.05 * without,
+            "turned, called exact": car.tunnel("exact", "navigation: {camera: {turn_floor_rad: 0}}\n", turned) > 1.05 * without,
         }
     failed = [name for name, holds in checks.items() if not holds]
     print(f"failed: {', '.join(failed)}" if failed else "all hold")

@@ -62,12 +62,6 @@ const std::vector<DriveMessage>& demo_with_tracks() {
   return kDemo;
 }
 
-std::unique_ptr<Stage> make_navigation(const Calibration& calibration) {
-  GnssInsProcessConfig config;
-  config.filter = InsFilter::kNavigation;
-  return make_gnss_ins_ekf(calibration, config);
-}
-
 std::vector<DriveMessage> outputs(std::unique_ptr<Stage> stage, const std::vector<DriveMessage>& drive) {
   Collected collected;
   StageRunner runner(std::move(stage), collected);
@@ -112,7 +106,8 @@ const std::vector<ShippedStage>& shipped_stages() {
        picture_drive},
       {"vo_tracker, mode msckf", picture_car(false),
        [](const Calibration& c) { return make_tracker(c, VoMode::kMsckf); }, picture_drive},
-      {"gnss_ins_ekf, navigation filter with tracks", demo_calibration(), make_navigation, demo_with_tracks},
+      {"gnss_ins_ekf, with tracks", demo_calibration(), [](const Calibration& c) { return make_gnss_ins_ekf(c, {}); },
+       demo_with_tracks},
   };
   return kStages;
 }

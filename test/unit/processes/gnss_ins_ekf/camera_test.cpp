@@ -1,4 +1,4 @@
-// VO_FEATURES in the stage gnss_ins_ekf with `filter: navigation`: what the calibration says of the camera, and what a
+// VO_FEATURES in the stage gnss_ins_ekf: what the calibration says of the camera, and what a
 // camera changes that shows nothing, is switched off, or sees.
 #include <catch2/catch.hpp>
 #include <roadfix/aiding_t.hpp>
@@ -6,6 +6,7 @@
 
 #include "bus/run/stage_runner.h"
 #include "gnss_ins_ekf/handler.h"
+#include "gnss_ins_ekf/vehicle_facts.h"
 #include "simulation/scenarios.h"
 #include "support/shared_data.h"
 #include "support/track_messages.h"
@@ -50,7 +51,6 @@ enum class Pictures { kAll, kEmpty, kNone };
 
 Published run(const Calibration& calibration, Pictures pictures, bool camera = true) {
   GnssInsProcessConfig config;
-  config.filter = InsFilter::kNavigation;
   config.navigation.sources.camera = camera;
   Published published;
   StageRunner runner(make_gnss_ins_ekf(calibration, config), published);
@@ -97,7 +97,6 @@ TEST_CASE("a camera that sees nothing leaves POSE_INS, bit for bit, what it is w
 TEST_CASE("the stage asks for VO_FEATURES where there is a camera that it may use") {
   const auto asks = [](const Calibration& calibration, bool camera) {
     GnssInsProcessConfig config;
-    config.filter = InsFilter::kNavigation;
     config.navigation.sources.camera = camera;
     const auto stage = make_gnss_ins_ekf(calibration, config);
     const auto& inputs = stage->spec().inputs;

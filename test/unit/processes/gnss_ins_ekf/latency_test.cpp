@@ -2,9 +2,9 @@
 #include <catch2/catch.hpp>
 #include <cstdio>
 
-#include "gnss_ins_ekf/handler.h"
 #include "gnss_ins_ekf/messages.h"
-#include "unit/gnss_ins/filter_run.h"
+#include "gnss_ins_ekf/vehicle_facts.h"
+#include "unit/navigation/filter_run.h"
 
 using namespace roadfix;
 
@@ -13,16 +13,16 @@ namespace {
 /// Share of the level errors within three of their sigmas, after a minute, where the filter believes of time what this
 /// calibration makes of it.
 double honest_share(const Calibration& calibration, const ScenarioConfig& s) {
-  test::LevelScore score;
+  navtest::LevelScore score;
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     const SimulatedDrive drive = simulate(s, seed);
-    GnssInsConfig config = test::filter_config(s);
-    const GnssInsVehicle said = gnss_ins_vehicle(calibration);
-    config.vehicle.position_latency_std = said.position_latency_std;
-    config.vehicle.velocity_latency_std = said.velocity_latency_std;
-    config.vehicle.time_offset_std = said.time_offset_std;
-    config.vehicle.wheel_latency_std = said.wheel_latency_std;
-    GnssIns filter(config);
+    navigation::NavigationConfig config = navtest::filter_config(s);
+    const navigation::VehicleFacts said = vehicle_facts(calibration);
+    config.facts.position_latency_std = said.position_latency_std;
+    config.facts.velocity_latency_std = said.velocity_latency_std;
+    config.facts.time_offset_std = said.time_offset_std;
+    config.facts.wheel_latency_std = said.wheel_latency_std;
+    navigation::Navigation filter(config);
     score.run(filter, drive, 60.0, s.duration_s);
   }
   return score.share();
@@ -48,23 +48,23 @@ ScenarioConfig short_city_loop() {
 TEST_CASE("a calibration that is silent about latencies does not claim to know them") {
   Calibration silent, exact;
   exact.sensors.gnss.emplace().position_latency_std = 0.0;
-  CHECK(gnss_ins_vehicle(silent).position_latency_std == 0.05);
-  CHECK(gnss_ins_vehicle(silent).velocity_latency_std == 0.05);
-  CHECK(gnss_ins_vehicle(exact).position_latency_std == 0.0);
-  CHECK(gnss_ins_vehicle(exact).velocity_latency_std == 0.0);
+  CHECK(vehicle_facts(silent).position_latency_std == 0.05);
+  CHECK(vehicle_facts(silent).velocity_latency_std == 0.05);
+  CHECK(vehicle_facts(exact).position_latency_std == 0.0);
+  CHECK(vehicle_facts(exact).velocity_latency_std == 0.0);
   exact.sensors.gnss->velocity_latency_std = 0.2;
-  CHECK(gnss_ins_vehicle(exact).velocity_latency_std == 0.2);
+  CHECK(vehicle_facts(exact).velocity_latency_std == 0.2);
 }
 
 TEST_CASE("a calibration that is silent about the IMU's clock does not claim to know it") {
   Calibration calibration;
-  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.0);  // the latency's doubt has it
+  CHECK(vehicle_facts(calibration).time_offset_std == 0.0);  // the latency's doubt has it
   calibration.sensors.gnss.emplace().position_latency_std = 0.0;
-  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.05);
+  CHECK(vehicle_facts(calibration).time_offset_std == 0.05);
   calibration.sensors.imu.emplace();
-  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.05);
+  CHECK(vehicle_facts(calibration).time_offset_std == 0.05);
   calibration.sensors.imu->time_offset_std = 0.0;
-  CHECK(gnss_ins_vehicle(calibration).time_offset_std == 0.0);
+  CHECK(vehicle_facts(calibration).time_offset_std == 0.0);
 }
 
 TEST_CASE("fixes 80 ms old are found to be so where the calibration is silent") {
@@ -103,11 +103,11 @@ TEST_CASE("INS_STATUS tells how old wheel speeds are, and how far the IMU's cloc
   s.wheels.link.clock_offset_s = 0.05;
   s.imu.link.clock_offset_s = -0.03;
   const SimulatedDrive drive = simulate(s, 1);
-  GnssInsConfig config = test::filter_config(s);
-  config.vehicle.time_offset_std = config.vehicle.wheel_latency_std = 0.05;
-  GnssIns filter(config);
-  test::run(filter, test::Samples(drive), [](GnssIns& f, int64_t) { f.clear_records(); });
-  const ins_status_t told = ins_status(filter.status(), filter.core(), config.vehicle);
+  navigation::NavigationConfig config = navtest::filter_config(s);
+  config.facts.time_offset_std = config.facts.wheel_latency_std = 0.05;
+  navigation::Navigation filter(config);
+  navtest::run(filter, navtest::Samples(drive), [](navigation::Navigation& f, int64_t) { f.clear_records(); });
+  const ins_status_t told = ins_status(filter.status(), filter.filter(), config.facts);
   CHECK(told.wheel_latency_std_s < 0.01);
   CHECK(std::abs(told.wheel_latency_s - 0.05) < 3.0 * told.wheel_latency_std_s);
   CHECK(told.imu_time_offset_std_s < 0.02);

@@ -1,2 +1,2 @@
 // Not compiled: breaches that the purity test must find.
-#include "gnss_ins/filter.h"
+#include "navigation/filter.h"

@@ -1,0 +1,15 @@
+/// What a calibration says about the sensors, as lib/navigation wants to be told; what it leaves open keeps the defaults.
+#pragma once
+
+#include <optional>
+
+#include "config/calibration.h"
+#include "navigation/config.h"
+
+namespace roadfix {
+
+/// Nothing without a left camera whose lens and mounting are known.
+std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibration);
+navigation::VehicleFacts vehicle_facts(const Calibration& calibration);
+
+}  // namespace roadfix
