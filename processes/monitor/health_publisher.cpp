@@ -16,11 +16,15 @@ constexpr int64_t kListen_us = 1'200'000;
 constexpr int64_t kGone_us = 3'000'000;
 }  // namespace
 
-HealthPublisher::HealthPublisher(Bus& bus, double period_s, bool heartbeat)
-    : bus_(bus), period_us_(std::llround(period_s * 1e6)), heartbeat_(heartbeat) {}
+HealthPublisher::HealthPublisher(Bus& bus, double period_s, std::optional<int64_t> started_us)
+    : bus_(bus),
+      period_us_(std::llround(period_s * 1e6)),
+      live_(started_us.has_value()),
+      run_(started_us.value_or(0)) {}
 
 void HealthPublisher::decided(const HealthReport& report, bool changed) {
   if (run_ == 0) run_ = report.now_us;
+  if (listens_since_us_ == 0) listens_since_us_ = report.now_us;
   if (must_be_silent(report.now_us)) return;
   if (changed || report.now_us - published_us_ >= period_us_) {
     published_us_ = report.now_us;
@@ -30,21 +34,21 @@ void HealthPublisher::decided(const HealthReport& report, bool changed) {
     message.seq = seq_++;
     bus_.publish("HEALTH", encode(message));
   }
-  if (heartbeat_ && report.now_us - heartbeat_us_ >= kHeartbeat_us) publish_heartbeat(report.now_us);
+  if (live_ && report.now_us - heartbeat_us_ >= kHeartbeat_us) publish_heartbeat(report.now_us);
 }
 
 void HealthPublisher::received(const BusMessage& message, int64_t now_us) {
   if (message.channel != "HEALTH" && message.channel != "HEARTBEAT_MONITOR") return;
   const std::optional<Header> header = read_header(message.bytes);
-  if (!header || header->run == run_ || (run_ != 0 && header->run > run_)) return;
+  if (!header || header->run >= run_) return;
   if (!other_us_ || now_us - *other_us_ > kGone_us)
     std::cerr << "monitor: another monitor publishes HEALTH here; this one only shows" << std::endl;
   other_us_ = now_us;
 }
 
 bool HealthPublisher::must_be_silent(int64_t now_us) const {
-  if (!heartbeat_) return false;
-  return now_us - run_ < kListen_us || (other_us_ && now_us - *other_us_ <= kGone_us);
+  if (!live_) return false;
+  return now_us - listens_since_us_ < kListen_us || (other_us_ && now_us - *other_us_ <= kGone_us);
 }
 
 void HealthPublisher::publish_heartbeat(int64_t now_us) {

@@ -12,8 +12,9 @@ namespace roadfix {
 
 class HealthPublisher : public MonitorListener {
  public:
-  /// `heartbeat`: false where a log is read; nothing lives there.
-  HealthPublisher(Bus& bus, double period_s, bool heartbeat);
+  /// `started_us`: when this process began, which decides which of two monitors is the older one; nothing where a log is
+  /// read: no heartbeat, for nothing lives there.
+  HealthPublisher(Bus& bus, double period_s, std::optional<int64_t> started_us);
 
   /// Live: where HEALTH comes from a monitor that has run for longer, this one shows and is silent, until the other is.
   /// For that it listens for a while before its first word.
@@ -28,10 +29,11 @@ class HealthPublisher : public MonitorListener {
 
   Bus& bus_;
   int64_t period_us_;
-  bool heartbeat_;
+  bool live_;
   ProcessLoad load_;
   UnsentMonitor unsent_;
-  int64_t run_ = 0;
+  int64_t run_;
+  int64_t listens_since_us_ = 0;
   int64_t seq_ = 0, heartbeat_seq_ = 0;
   int64_t published_us_ = 0, heartbeat_us_ = 0;
   std::optional<int64_t> other_us_;  ///< when an older monitor published last

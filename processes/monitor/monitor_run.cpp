@@ -56,11 +56,12 @@ std::unique_ptr<Dashboard> dashboard_of(const MonitorOptions& options, const Mon
 void run_live(const MonitorOptions& options, const MonitorConfig& config) {
   release_free_memory();
   if (options.realtime > 0) make_realtime(options.realtime);
-  NetworkBus bus(options.bus);
   RunClock clock;
+  const int64_t started_us = clock.now_utime();
+  NetworkBus bus(options.bus);
   HostMonitor host(config.recordings);
   MonitorHandler handler(config, expectations_of(config, options.vehicle));
-  HealthPublisher publisher(bus, config.publish_period, true);
+  HealthPublisher publisher(bus, config.publish_period, started_us);
   const std::unique_ptr<Dashboard> dashboard = dashboard_of(options, config, handler.health(), "the bus");
   Terminal terminal(options.plain, dashboard ? "Dashboard: " + dashboard->url() : "");
   handler.add(publisher);
@@ -110,7 +111,7 @@ void run_logs(const MonitorOptions& options, const MonitorConfig& config) {
   std::unique_ptr<HealthPublisher> publisher;
   if (!options.log_out.empty()) {
     sink = std::make_unique<LogSink>(options.log_out);
-    publisher = std::make_unique<HealthPublisher>(*sink, config.publish_period, false);
+    publisher = std::make_unique<HealthPublisher>(*sink, config.publish_period, std::nullopt);
     handler.add(*publisher);
   }
   const std::unique_ptr<Dashboard> dashboard =

@@ -157,7 +157,7 @@ TEST_CASE("a vehicle's folder says what to expect") {
 TEST_CASE("the monitor says what the network did not take of its own messages") {
   for (const bool gone : {true, false}) {
     test::OutageBus bus;
-    HealthPublisher publisher(bus, 0.5, true);
+    HealthPublisher publisher(bus, 0.5, kStart_us);
     HealthReport report;
     bus.gone = gone;
     report.now_us = kStart_us;
@@ -172,9 +172,30 @@ TEST_CASE("the monitor says what the network did not take of its own messages") 
   }
 }
 
+TEST_CASE("of two monitors the older is the one that was started first, however late its first word") {
+  for (const bool older : {true, false}) {
+    test::OutageBus bus;
+    HealthPublisher publisher(bus, 0.5, kStart_us);
+    int received = 0;
+    bus.subscribe("HEALTH", [&received](const BusMessage&) { ++received; });
+    health_t other{};
+    other.utime = kStart_us + 700'000;
+    other.run = kStart_us + (older ? 500'000 : -500'000);
+    const std::vector<uint8_t> bytes = encode(other);
+    publisher.received({"HEALTH", bytes, other.utime}, other.utime);
+    HealthReport report;
+    for (const int64_t after_us : {800'000, 2'100'000}) {
+      report.now_us = kStart_us + after_us;
+      publisher.decided(report, true);
+    }
+    while (bus.handle(std::chrono::milliseconds(0))) continue;
+    CHECK(received == (older ? 1 : 0));
+  }
+}
+
 TEST_CASE("of two monitors the younger is silent, and speaks when the older is gone") {
   test::OutageBus bus;
-  HealthPublisher publisher(bus, 0.5, true);
+  HealthPublisher publisher(bus, 0.5, kStart_us);
   HealthReport report;
   int received = 0;
   bus.subscribe("HEALTH", [&received](const BusMessage&) { ++received; });
