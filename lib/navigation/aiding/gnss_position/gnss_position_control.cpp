@@ -11,8 +11,9 @@ namespace {
 
 constexpr double kOutage = 3.0;    // s without a position, after which its errors are new
 constexpr double kForEver = 1e12;  // s
-// Of a fixed carrier phase: half a wavelength's error of the path lasts, and no way is known well enough to show it.
-constexpr LastingError kPhase = {0.05, 1.0 / 20.0};
+// Of a fixed carrier phase: multipath of a few millimetres (3.5 of a usual claim of 20) lasts, and no way is known well
+// enough to show it.
+constexpr LastingError kPhase = {0.03, 1.0 / 20.0};
 // The velocity of a filter that is aided is off by the same for about so long: what the driven way drifts by is a random
 // walk of twice its variance times this, and no less than a centimetre.
 constexpr double kVelocityTime = 1.0;  // s
