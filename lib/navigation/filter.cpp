@@ -23,12 +23,14 @@ constexpr double kFadeWalk = 0.3;    // of the logarithm, 1/sqrt(s)
 double square(double x) { return x * x; }
 
 // How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they
-// differ from one turn-on to the next, a receiver that follows a reflection or is dragged off.
+// differ from one turn-on to the next, a receiver that follows a reflection or is dragged off, a clock that is set by
+// another one. Without an imu there is no clock of its own.
 StepDetector::Sizes typical_steps(const VehicleFacts& v) {
-  constexpr double kScale = 0.02, kDisplacement = 5.0, kDrag = 0.5;  // 1, m, m/s
+  constexpr double kScale = 0.02, kDisplacement = 5.0, kDrag = 0.5, kClock = 0.05;  // 1, m, m/s, s
   StepDetector::Sizes s;
   s << kScale, Eigen::Vector3d::Constant(v.gyro_bias_std), Eigen::Vector3d::Constant(v.accel_bias_std),
-      Eigen::Vector3d::Constant(kDisplacement), Eigen::Vector3d::Constant(kDrag);
+      Eigen::Vector3d::Constant(kDisplacement), Eigen::Vector3d::Constant(kDrag), v.has_imu ? kClock : 0.0, kClock,
+      kClock;
   return s;
 }
 
@@ -277,7 +279,7 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
 
 std::optional<StepDetector::Step> Filter::mend_step(double sigmas, bool displaced) {
   if (!steps_.take_fresh() || !steps_.most_likely(sigmas, displaced)) {
-    steps_.advance(state_);
+    steps_.advance(state_, motion_);
     return std::nullopt;
   }
   flush();
@@ -291,7 +293,7 @@ std::optional<StepDetector::Step> Filter::mend_step(double sigmas, bool displace
     scratch_.head(n) = per_unit * root.col(k);
     for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += scratch_(j) * scratch_.head(n);
   }
-  steps_.begin(state_);
+  steps_.begin(state_, motion_);
   return step;
 }
 

@@ -4,19 +4,13 @@
 #pragma once
 
 #include "inertial/strapdown.h"
+#include "navigation/body_motion.h"
 #include "navigation/config.h"
 #include "navigation/measurement.h"
 #include "navigation/step_detector.h"
 #include "navigation/velocity_lag.h"
 
 namespace roadfix::navigation {
-
-/// What measurements need of the motion at the state's epoch besides the state.
-struct BodyMotion {
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< rad/s against the Earth, imu axes, smoothed
-  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s2, dv/dt, level axes, smoothed
-  VelocityLag lag;                                         ///< of the filter alone, not of its output
-};
 
 /// Moves the means over the `dt` s that end at imu.t_us, (N.2.1) to (N.2.3); GNSS biases decay elsewhere.
 void integrate(Mean& x, inertial::InertialStep& last, BodyMotion& motion, inertial::Earth& earth, const ImuSample& imu,
@@ -77,7 +71,7 @@ class Filter {
   void widen(const BaseVector& d);
 
   /// Watches for steps from now on, (N.5.8).
-  void watch_for_steps() { steps_.begin(state_); }
+  void watch_for_steps() { steps_.begin(state_, motion_); }
   [[nodiscard]] StepDetector& steps() { return steps_; }
   /// A step that explains the innovations better than chance does at this many sigmas is taken back.
   std::optional<StepDetector::Step> mend_step(double sigmas, bool displaced);

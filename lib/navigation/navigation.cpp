@@ -365,7 +365,7 @@ void Navigation::use_pictures(int64_t t_us) {
 void Navigation::mend_steps() {
   if (!config_.aiding.step_detection) return;
   if (imu_noise_.frozen())
-    return filter_->steps().begin(filter_->state());  // what the filter is off by is no sensor's step
+    return filter_->watch_for_steps();  // what the filter is off by is no sensor's step
   GnssPositionControl& gnss = aiding_.gnss_position();
   const auto step = filter_->mend_step(config_.aiding.gate_sigma, gnss.displaced());
   if (!step) return;

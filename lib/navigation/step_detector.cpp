@@ -16,12 +16,15 @@ struct Block {
   StepKind kind;
   int first, size;
   /// Minus the logarithm of how often it steps, against the receiver (assumed): that is displaced once an hour, wheels
-  /// change once in seven, and an imu's bias, which temperature moves over minutes, hardly ever does.
+  /// change or a clock is set once in seven, and an imu's bias, which temperature moves over minutes, hardly ever steps.
   double rarity;
 };
 constexpr std::array<Block, StepDetector::kKinds> kBlocks = {
-    Block{StepKind::kWheels, 0, 1, 2.0}, Block{StepKind::kImu, 1, 6, 7.0}, Block{StepKind::kReceiver, 7, 6, 0.0}};
-constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10;  // columns
+    Block{StepKind::kWheels, 0, 1, 2.0},         Block{StepKind::kImu, 1, 6, 7.0},
+    Block{StepKind::kReceiver, 7, 6, 0.0},       Block{StepKind::kImuClock, 13, 1, 2.0},
+    Block{StepKind::kReceiverClock, 14, 1, 2.0}, Block{StepKind::kWheelClock, 15, 1, 2.0}};
+constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10, kImuClock = 13, kReceiverClock = 14,
+              kWheelClock = 15;  // columns
 
 /// A step of normal prior given the evidence: mean, covariance, and the logarithm of the Bayes factor.
 struct Posterior {
@@ -45,22 +48,31 @@ struct Posterior {
 
 }  // namespace
 
-void StepDetector::begin(State& state) {
+void StepDetector::begin(State& state, const BodyMotion& motion) {
   if (state.carried().cols() != kColumns) state.carry(kColumns);
-  for (int m = 0; m < kMoments; ++m) begin(state, m);
+  for (int m = 0; m < kMoments; ++m) begin(state, motion, m);
   next_us_ = 0;
   usual_ = 1.0;
   fresh_ = false;
   watches_ = true;
 }
 
-void StepDetector::begin(State& state, int moment) {
+/// An imu's clock that is set forward by d leaves a gap of d in its stamps, over which the state is moved once too often, and
+/// one that is set back leaves out as much, (N.5.9).
+void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
   auto columns = state.carried().middleCols(first(moment), width(moment));
   columns.setZero();
   columns(kWheelScale, 0) = 1.0;
   if (moment < kRecent) {
     columns.block<6, 6>(kGyroBias, kBiases).setIdentity();
     columns.block<3, 3>(kGnssBias, kDisplacement).setIdentity();
+    columns(kImuOffset, kImuClock) = 1.0;
+    const Eigen::Vector3d turned = state.x.R() * motion.rate;
+    columns.block<3, 1>(kAtt, kImuClock) = -turned;
+    columns.block<3, 1>(kVel, kImuClock) = turned.cross(state.x.nav.velocity) - motion.acceleration;
+    columns.block<3, 1>(kPos, kImuClock) = turned.cross(state.x.nav.position - state.p_ref) - state.x.nav.velocity;
+    columns(kPositionLatency, kReceiverClock) = columns(kVelocityLatency, kReceiverClock) = 1.0;
+    columns(kWheelLatency, kWheelClock) = 1.0;
   }
   information_[static_cast<size_t>(moment)].setZero();
   sum_.col(moment).setZero();
@@ -68,7 +80,7 @@ void StepDetector::begin(State& state, int moment) {
 }
 
 /// Two moments per octave: of one second the first two take turns, of two seconds the next two, ...
-void StepDetector::advance(State& state) {
+void StepDetector::advance(State& state, const BodyMotion& motion) {
   const int64_t t_us = state.x.t_us;
   if (!watches_ || t_us < next_us_) return;
   next_us_ = t_us + kApart_us;
@@ -76,7 +88,7 @@ void StepDetector::advance(State& state) {
   for (int octave = 0; octave < kMoments / 2; ++octave) {
     const int period = 1 << octave;
     if (turn_ % period != 0) break;
-    begin(state, 2 * octave + (turn_ / period) % 2);
+    begin(state, motion, 2 * octave + (turn_ / period) % 2);
   }
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "navigation/body_motion.h"
 #include "navigation/state.h"
 
 namespace roadfix::navigation {
@@ -18,15 +19,18 @@ enum class StepKind {
   kWheels,    ///< their scale
   kImu,       ///< gyro and accelerometer biases
   kReceiver,  ///< its position is displaced, and may be dragged on from there
+  kImuClock,
+  kReceiverClock,
+  kWheelClock,
 };
 
 class StepDetector {
  public:
-  static constexpr int kKinds = 3, kMoments = 8;
+  static constexpr int kKinds = 6, kMoments = 8;
   /// Of these moments all kinds are carried, of the older ones the wheels' scale alone.
   static constexpr int kRecent = 4;
-  /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate.
-  static constexpr int kWidth = 13;
+  /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate, three clocks.
+  static constexpr int kWidth = 16;
   static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent;
   static constexpr int width(int moment) { return moment < kRecent ? kWidth : 1; }
   static constexpr int first(int moment) {
@@ -48,11 +52,11 @@ class StepDetector {
   explicit StepDetector(const Sizes& typical) : typical_(typical) {}
 
   /// Watches from now on.
-  void begin(State& state);
+  void begin(State& state, const BodyMotion& motion);
   void stop() { watches_ = false; }
   [[nodiscard]] bool watches() const { return watches_; }
   /// Often: the oldest of the recent moments are replaced by now.
-  void advance(State& state);
+  void advance(State& state, const BodyMotion& motion);
 
   /// The filter's covariance step over T s.
   void move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
@@ -101,7 +105,7 @@ class StepDetector {
     int moment = 0;
     double log_odds = 0.0;
   };
-  void begin(State& state, int moment);
+  void begin(State& state, const BodyMotion& motion, int moment);
   [[nodiscard]] Fit best_of(int at, int size) const;
 
   Sizes typical_;

@@ -18,10 +18,13 @@ struct Gates {
   }
   /// Passes everything: for hypotheses that are weighed by their likelihood.
   static Gates open() {
-    Gates g(1.0);
+    Gates g;
     g.nis.fill(1e12);
     return g;
   }
+
+ private:
+  Gates() = default;
 };
 
 }  // namespace roadfix::navigation
