@@ -304,6 +304,7 @@ void Filter::reset_block(int at, const Eigen::Vector3d& value, const Eigen::Vect
   P.middleRows<3>(at).leftCols(n).setZero();
   P.middleCols<3>(at).topRows(n).setZero();
   P.diagonal().segment<3>(at) = std.cwiseAbs2();
+  state_.carried().middleRows<3>(at).setZero();
   if (at == kGnssBias) state_.x.gnss_bias = value;
   if (at == kGnssVelocityBias) state_.x.gnss_velocity_bias = value;
 }
@@ -319,6 +320,7 @@ void Filter::end_return() {
   const int n = state_.size();
   state_.P().middleRows<4>(kGnssReturn).leftCols(n).setZero();
   state_.P().middleCols<4>(kGnssReturn).topRows(n).setZero();
+  state_.carried().middleRows<4>(kGnssReturn).setZero();
   state_.x.gnss_return.setZero();
   state_.x.return_rate = 0.0;
 }
