@@ -129,3 +129,15 @@ TEST_CASE("wheels that slip by less than their gate do not lead away from fixed 
 TEST_CASE("a receiver that repeats itself does not make wheels doubted") {
   check_held(drive_with("gnss.stuck@60+20", 120.0, 1), 1.0, 0.05);
 }
+
+TEST_CASE("a clock that is set by 50 ms is found out, whose ever it is") {
+  for (const char* fault : {"imu.clock@60", "imu.clock@60:offset_s=-0.05", "gnss.clock@60", "wheels.clock@60"}) {
+    for (uint64_t seed = 1; seed <= 2; ++seed) {
+      const Worst w = drive_with(fault, 110.0, seed);
+      CAPTURE(fault, seed);
+      check_held(w, 0.1, 0.05);
+      CHECK(w.beyond < 5.0);
+    }
+    CHECK(drive_with(fault, 110.0, 1, nullptr, false).horizontal > 0.2);  // teeth
+  }
+}
