@@ -25,6 +25,7 @@ constexpr double kTruthShown = 3.0;          // s since the last position, to le
 constexpr double kWheelsSilent = 0.3;        // s without a wheel speed, after which the constraint keeps its own time
 constexpr double kMoving = 1.0;              // m/s
 constexpr double kReverseTime = 3.0;         // s of driving backwards, faster than a car goes in reverse
+constexpr double kAgreedWay = 30.0;          // m, with fixes, after which a start is taken for right
 constexpr double kWheelPeriodSlack = 0.005;  // s
 constexpr double kPredictorSpan = 1.0;       // s that one transition of the output covariance may cover
 
@@ -214,7 +215,7 @@ void Navigation::step(const ImuSample& imu) {
   if (phase_ == Phase::kDone) {
     filter_->predict(imu, dt, noise_over(imu.t_us, dt));
     step_aligned(imu, block_done);
-    if (heads_backwards()) return align_again();
+    if (heads_backwards() || started_wrong()) return align_again();
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == Phase::kHeading) {
     step_heading(imu, dt, block_done);
@@ -289,6 +290,8 @@ void Navigation::end_alignment() {
   all.stop();
   phase_ = Phase::kDone;
   backwards_since_us_ = last_step_us_;
+  start_agreed_ = !alignment_.remembers_heading();
+  started_at_ = filter_->state().x.nav.position;
   predictor_stale_ = true;
   if (abandoned_) count_reset(*abandoned_, filter_->state().x);
 }
@@ -344,6 +347,10 @@ bool Navigation::heads_backwards() {
   return seconds_between(backwards_since_us_, x.t_us) > kReverseTime;
 }
 
+/// A remembered heading that no fix has agreed with over some way has no past to hold against a receiver that contradicts: it
+/// is that of a car that was turned while it was parked.
+bool Navigation::started_wrong() const { return !start_agreed_ && aiding_.gnss_position().displaced(); }
+
 bool Navigation::standing(const Filter& filter, bool block_done) const {
   if (!block_done) return false;
   if (!config_.facts.has_imu)
@@ -364,8 +371,7 @@ void Navigation::use_pictures(int64_t t_us) {
 /// A step that explains the innovations is taken back, (N.5.10).
 void Navigation::mend_steps() {
   if (!config_.aiding.step_detection) return;
-  if (imu_noise_.frozen())
-    return filter_->watch_for_steps();  // what the filter is off by is no sensor's step
+  if (imu_noise_.frozen()) return filter_->watch_for_steps();  // what the filter is off by is no sensor's step
   GnssPositionControl& gnss = aiding_.gnss_position();
   const auto step = filter_->mend_step(config_.aiding.gate_sigma, gnss.displaced());
   if (!step) return;
@@ -381,6 +387,9 @@ void Navigation::use(const Queued& q) {
   note(r, q.id);
   if (q.kind != Queued::Kind::kPosition) return;
   if (r.status == AidingStatus::kAccepted) alignment_.fix_agreed();
+  if (r.status == AidingStatus::kAccepted && !aiding_.gnss_position().displaced() &&
+      (filter_->state().x.nav.position - started_at_).norm() > kAgreedWay)
+    start_agreed_ = true;
   if (r.status != AidingStatus::kReset) return;
   count_reset(before, filter_->state().x);
   if (camera_) camera_->forget_poses(filter_->state());
@@ -471,7 +480,7 @@ void Navigation::serialise(Archive& a) {
       a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
   a(phase_, predictor_stale_, lag_us_, last_step_us_, last_wheel_us_, wheels_at_us_, last_magnetic_us_, last_fix_us_,
     last_fix_.latitude, last_fix_.longitude, last_fix_.height, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
-    bad_imu_, gaps_, steps_, backwards_since_us_);
+    bad_imu_, gaps_, steps_, backwards_since_us_, start_agreed_, started_at_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

@@ -109,6 +109,7 @@ class Navigation {
   [[nodiscard]] inertial::ImuNoise noise_over(int64_t t_us, double dt) const;
   [[nodiscard]] bool standing(const Filter& filter, bool block_done) const;
   bool heads_backwards();
+  [[nodiscard]] bool started_wrong() const;
   [[nodiscard]] bool usable() const;
   /// No GNSS is to be used: the frame is local.
   [[nodiscard]] bool local() const {
@@ -148,7 +149,9 @@ class Navigation {
   int reset_counter_ = 0;
   SE3 reset_delta_;
   int64_t bad_imu_ = 0, gaps_ = 0, steps_ = 0;
-  int64_t backwards_since_us_ = 0;  ///< faster than a car goes in reverse
+  int64_t backwards_since_us_ = 0;                        ///< faster than a car goes in reverse
+  bool start_agreed_ = true;                              ///< fixes have, over some way
+  Eigen::Vector3d started_at_ = Eigen::Vector3d::Zero();  ///< m, level
   std::vector<AidingRecord> records_;
 };
 

@@ -31,6 +31,7 @@ class Alignment {
   /// Started where it was parked, and no fix has agreed yet.
   [[nodiscard]] bool parked() const { return parked_; }
   void fix_agreed() { parked_ = false; }
+  [[nodiscard]] bool remembers_heading() const { return memory_ && memory_->parked; }
   /// The remembered place did not hold; sensor errors are kept.
   void forget_place();
 

@@ -163,3 +163,12 @@ TEST_CASE("axle and antenna are remembered as they were found, whatever the cali
   recall(memory, x, std);
   CHECK(x.p_imu_axle.x() == -0.6);
 }
+
+TEST_CASE("a car that was turned on its place recovers from the heading it remembers") {
+  Memory turned = cut().memory;
+  turned.q_enu_imu = exp_q({0.0, 0.0, 100.0 * kDegree}) * turned.q_enu_imu;
+  const Second s = drive_again(turned, cut().rest, 120.0);
+  CHECK(s.resets >= 1);
+  CHECK(s.yaw_end_deg < 0.5);
+  CHECK(s.horizontal_end < 0.3);
+}
