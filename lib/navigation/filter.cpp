@@ -65,7 +65,13 @@ void Filter::adopt(const Filter& other, const CameraFacts& camera) {
     std.segment<3>(kLens) = Eigen::Vector3d(camera.focal_std, camera.radial_std, camera.radial4_std);
   }
   std(kCameraOffset) = camera.offset_std;
-  state_.adopt(other.state_, mean, std.cwiseAbs2());
+  adopt(other, mean, std);
+}
+
+void Filter::adopt_without_camera(const Filter& other) { adopt(other, Mean(), BaseVector::Zero()); }
+
+void Filter::adopt(const Filter& other, const Mean& camera, const BaseVector& std) {
+  state_.adopt(other.state_, camera, std.cwiseAbs2());
   earth_ = other.earth_;
   sums_ = other.sums_;
   last_ = other.last_;

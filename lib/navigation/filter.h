@@ -25,6 +25,8 @@ class Filter {
 
   /// Goes on as `other`, which has no camera, with the camera as the calibration knows it.
   void adopt(const Filter& other, const CameraFacts& camera);
+  /// Goes on as `other` without its camera; this one has none.
+  void adopt_without_camera(const Filter& other);
 
   /// Moves mean and covariance over the `dt` s that end at imu.t_us, (N.2).
   void predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise);
@@ -110,6 +112,7 @@ class Filter {
     Eigen::Matrix<double, kWithoutCamera, 1> decay, noise;
   };
   [[nodiscard]] Diagonal diagonal(double T) const;
+  void adopt(const Filter& other, const Mean& camera, const BaseVector& std);
   [[nodiscard]] inertial::ErrorTransition transition() const;
   template <int Rows>
   [[nodiscard]] Eigen::Matrix<double, Rows, Rows> innovation_covariance(const Measurement<Rows>& m) const;

@@ -209,11 +209,12 @@ void Navigation::step(const ImuSample& imu) {
     forget_before(imu.t_us - static_cast<int64_t>(1e6 * config_.process.max_gap));
     aiding_.gnss_position().clear_run();
   }
-  // While moving: a turn that nobody saw must fit into one of the start's hypotheses, or all are asked again.
-  const bool turned = kBridgeRate * dt > 2.0 * config_.start.heading_std;
-  if (dt > kRealignGap || (turned && moved_meanwhile(dt))) align_again();
+  // While moving: a turn that nobody saw and that fits into none of the start's hypotheses.
+  const bool turned = kBridgeRate * dt > 2.0 * config_.start.heading_std && !local() && moved_meanwhile(dt);
+  if (dt > kRealignGap || (turned && phase_ == Phase::kHeading)) align_again();
   if (phase_ == Phase::kDone) {
     filter_->predict(imu, dt, noise_over(imu.t_us, dt));
+    if (turned) return ask_heading();
     step_aligned(imu, block_done);
     if (heads_backwards() || started_wrong()) return align_again();
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
@@ -230,6 +231,7 @@ void Navigation::step(const ImuSample& imu) {
       back = aiding_.gnss_position().return_std(*alignment_.fix());
     }
     if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias, back)) return;
+    if (!alignment_.parked()) aiding_.gnss_position().started_with(*alignment_.fix());
     // What is older made the start, or lies too far back to be carried over an unknown acceleration.
     forget_before(imu.t_us + 1);
     predictor_stale_ = true;
@@ -308,6 +310,16 @@ void Navigation::align_again() {
   aiding_.gnss_position().restart();
   predictor_stale_ = true;
   lag_us_ = lag_of(prior_age(config_.facts));
+}
+
+/// A turn that nobody saw: all that is known stays, the receiver's displacement and every clock among it, but the heading.
+void Navigation::ask_heading() {
+  abandoned_ = SE3{filter_->state().x.nav.q_level_imu, filter_->state().x.nav.position};
+  alignment_.hypotheses().start(*filter_);
+  filter_.reset();
+  if (camera_) camera_->restart();
+  phase_ = Phase::kHeading;
+  predictor_stale_ = true;
 }
 
 void Navigation::step_aligned(const ImuSample& imu, bool block_done) {

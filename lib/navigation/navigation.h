@@ -102,6 +102,7 @@ class Navigation {
   void use_pictures(int64_t t_us);
   void mend_steps();
   void align_again();
+  void ask_heading();
   void try_local_start(int64_t t_us);
   void end_alignment();
   void note(AidingRecord record, int64_t id = 0);

@@ -130,8 +130,8 @@ class State {
 
   /// Starts with these variances of the base block; poses and points are dropped, p_ref is the position.
   void reset(const Mean& mean, const BaseVector& variance);
-  /// Becomes `other`, a state without camera, with the camera of `camera` known with these variances (those of the
-  /// base block behind kWithoutCamera count).
+  /// Becomes `other` without its camera, with the camera of `camera` known with these variances (those of the base block
+  /// behind kWithoutCamera count).
   void adopt(const State& other, const Mean& camera, const BaseVector& variance);
   /// Drops poses and points.
   void drop_clones();

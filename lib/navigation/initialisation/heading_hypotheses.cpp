@@ -28,6 +28,8 @@ constexpr double kSameHeading = 15.0 * kDegree;
 constexpr double kStartPosition = 1000.0, kStartVelocity = 100.0, kStartTilt = 0.5;  // m, m/s, rad: nothing is known
 constexpr double kLocalPlace = 1e-4;  // m: where a local frame begins is a convention
 
+double square(double x) { return x * x; }
+
 BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double yaw_std) {
   const VehicleFacts& v = c.facts;
   BaseVector std = BaseVector::Zero();
@@ -79,6 +81,35 @@ void HeadingHypotheses::start(const inertial::Earth& earth, const StartState& s)
   // What it stood on may have been turned: on a ferry, by a tow to the next bay.
   if (s.parked_yaw) add_hypothesis(earth, s, *s.parked_yaw, std::hypot(s.memory->heading_sigma, kParkedYaw), 0.0);
   normalise();
+}
+
+void HeadingHypotheses::start(const Filter& unsure) {
+  filters_.clear();
+  log_weights_.clear();
+  leader_ = 0;
+  Filter known = unsure;
+  known.flush();
+  known.state().release();
+  Filter filter(config_, known.earth(), false);
+  filter.adopt_without_camera(known);
+  filter.consider(kPositionLatency, 4);
+  const int64_t now_us = filter.state().x.t_us;
+  (void)filter.fuse(AidingSource::kNonholonomic, now_us, road_level(filter.state(), config_.car.tilt_std),
+                    Gates::open().nis[2]);
+  const double spread = square(vehicle_heading_std(filter.state())), own = square(config_.start.heading_std);
+  const double between = std::max(spread - own, 0.0);
+  const int n = between > 0.0 ? config_.start.headings : 1;
+  for (int i = 0; i < n; ++i) {
+    const double off = wrap_angle(2.0 * kPi * i / n);
+    const double log_weight = i == 0 ? 0.0 : -0.5 * off * off / between;
+    if (log_weight < std::log(kNegligible)) continue;
+    filters_.push_back(filter);
+    log_weights_.push_back(log_weight);
+    if (n == 1) continue;
+    Measurement<1> m = bearing(filter.state(), Eigen::Vector3d::UnitX(), 0.0, std::sqrt(spread * own / between));
+    m.residual(0) = off * spread / between;
+    (void)filters_.back().fuse(AidingSource::kGnssHeading, now_us, m, Gates::open().nis[1]);
+  }
 }
 
 void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const StartState& s, double yaw, double yaw_std,

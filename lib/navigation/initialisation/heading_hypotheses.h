@@ -17,6 +17,8 @@ class HeadingHypotheses {
   explicit HeadingHypotheses(const NavigationConfig& config) : config_(config) {}
 
   void start(const inertial::Earth& earth, const StartState& start);
+  /// Goes on from a filter whose heading has become unsure and keeps all else that it knows, (N.7.8).
+  void start(const Filter& unsure);
   void predict(const ImuSample& imu, double dt, const inertial::ImuNoise& noise);
 
   /// Every hypothesis tries aid(filter); weights follow. Returns the leader's record.

@@ -61,6 +61,15 @@ TEST_CASE("fixes 15 m off for half a minute are not followed") {
   check_held(drive_with("gnss.bias@60+30:east_m=15", 120.0, 2), 1.5, 0.2);
 }
 
+TEST_CASE("what is known against a receiver outlasts an IMU that is silent for two seconds") {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const Worst w = drive_with("gnss.bias@60+40:east_m=6", 90.0, seed, "imu.silence@70+2");
+    CAPTURE(seed, w.horizontal, w.beyond, w.last, w.resets);
+    CHECK(w.last < 1.0);
+    CHECK(w.beyond < 5.0);
+  }
+}
+
 TEST_CASE("a receiver that stays 15 m off is believed in the end") {
   const Worst w = drive_with("gnss.bias@60+200:east_m=15", 180.0, 2);
   CHECK(w.resets >= 1);

@@ -121,18 +121,22 @@ void GnssPositionControl::set_noise(Filter& filter, const Bias& bias) const {
 /// Where b's share turns out to be another, what of the fixes went to the place and what to b was wrong from the start.
 void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
   set_noise(filter, bias);
-  if (bias.anew) {
-    filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
-  } else if (config_.facts.has_imu && share_ > 0.0 && bias.like.share != share_ && !displaced()) {
+  const bool other_share = share_ > 0.0 && bias.like.share != share_;
+  if (!bias.anew && other_share && config_.facts.has_imu && !displaced())
     filter.rescale_gnss_bias(kGnssBias, bias.like.share / share_);
-  }
   share_ = bias.like.share;
+  begin(filter, bias);
+}
+
+void GnssPositionControl::begin(Filter& filter, const Bias& bias) const {
+  if (bias.anew) filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
   if (bias.returns) filter.begin_return(kReturn);
 }
 
 AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) const {
   Bias bias = bias_of(fix);
   set_noise(filter, bias);
+  if (!displaced()) begin(filter, bias);
   bias = bias.begun();
   return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
@@ -172,7 +176,7 @@ AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued&
     error_time_.see_innovation(
         {r.innovation[0] / std::sqrt(r.innovation_variance[0]), r.innovation[1] / std::sqrt(r.innovation_variance[1])});
   settle(filter, fix);
-  note(fix);
+  note(fix.t_us, fix.fix_type);
   return r;
 }
 
@@ -209,7 +213,7 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   settle(filter, fix);
   if (r.status == AidingStatus::kReset) forget_way();
   if (r.status == AidingStatus::kAccepted || r.status == AidingStatus::kReset) {
-    note(fix);
+    note(fix.t_us, fix.fix_type);
     rejected_ = 0;
   }
   return r;

@@ -25,11 +25,9 @@ class GnssPositionControl {
   AidingRecord use(Filter& filter, const Queued& fix);
   /// For a hypothesis of the start: no gate, no learning.
   AidingRecord try_on(Filter& filter, const Queued& fix) const;
-  /// A fix was tried on the hypotheses of a start.
-  void tried(const Queued& fix) {
-    note(fix);
-    share_ = lasting(fix.fix_type).share;
-  }
+  /// A fix was tried on the hypotheses of a start, or made them.
+  void tried(const Queued& fix) { note_start(fix.t_us, fix.fix_type); }
+  void started_with(const GnssFix& fix) { note_start(fix.t_us, fix.fix_type); }
   /// m, level axes: of the Gauss-Markov error in a fix, and of what it may have brought back from an outage.
   [[nodiscard]] Eigen::Vector3d lasting_std(const GnssFix& fix) const;
   [[nodiscard]] Eigen::Vector3d return_std(const GnssFix& fix) const;
@@ -88,9 +86,13 @@ class GnssPositionControl {
   };
 
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
-  void note(const Queued& fix) {
-    used_at_us_ = fix.t_us;
-    last_type_ = fix.fix_type;
+  void note(int64_t t_us, FixType type) {
+    used_at_us_ = t_us;
+    last_type_ = type;
+  }
+  void note_start(int64_t t_us, FixType type) {
+    note(t_us, type);
+    share_ = lasting(type).share;
   }
   [[nodiscard]] bool returns(int64_t t_us, FixType type) const;
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
@@ -98,6 +100,7 @@ class GnssPositionControl {
   [[nodiscard]] LastingError lasting(FixType type) const;
   void set_noise(Filter& filter, const Bias& bias) const;
   void set_bias(Filter& filter, const Bias& bias);
+  void begin(Filter& filter, const Bias& bias) const;
   void watch(const Filter& filter, const Queued& fix, const Bias& bias, const Eigen::Vector2d& before);
   /// A code receiver without an imu beside it: nothing but other fixes could show an outlier.
   [[nodiscard]] bool heavy_tailed(FixType type) const {
