@@ -301,6 +301,8 @@ ChannelScore evaluate_channel(const Reference& reference, const DriveFacts& fact
   if (report.alignment == Alignment::kNone)
     report.protection = protection_score(estimate.protection, report.errors, facts.reference.sigma_m);
   report.usable = usable_share(report, options.usable_within);
+  if (options.slow_window > 0.0)
+    report.slowless = slowless_figures(report.errors, options.slow_window, options.rpe_stride);
   if (!report.scored.empty()) {
     const auto tied = tied_pairs(report, unaligned, reference, facts, estimate, kind);
     report.consistency = covariance_consistency(tied, kind, facts.reference.sigma_m);

@@ -14,6 +14,7 @@
 #include "evaluation/modes.h"
 #include "evaluation/outages.h"
 #include "evaluation/protection_score.h"
+#include "evaluation/slow_error.h"
 
 namespace roadfix {
 
@@ -49,6 +50,7 @@ struct EvaluationOptions {
   double turn_threshold = 3.0 * 3.14159265358979323846 / 180.0;  ///< rad/s, of MPA
   double usable_within = kUsableWithin;                          ///< m, horizontally
   int rpe_stride = 100;                                          ///< samples, Lee et al. (2025)
+  double slow_window = 0.0;  ///< s: the figures are also given without what of the error is slower (E.4.4); 0: not
 };
 
 struct AlignedAte {
@@ -84,6 +86,7 @@ struct ChannelScore {
   std::optional<double> rpe_mean;         ///< m, Lee et al. (2025)
   std::optional<RelativeError> rpe_rmse;  ///< evo, over the samples of about one second
   std::optional<KittiDrift> kitti;
+  std::optional<SlowlessFigures> slowless;  ///< as asked for
   OutageErrors outages;
   std::optional<double> tse_m;
   std::optional<Reconvergence> rct;

@@ -27,7 +27,7 @@ std::optional<SlowlessFigures> slowless_figures(const std::vector<PoseError>& er
     norms.push_back(left[i].norm());
     if (i + step < left.size()) steps.push_back((left[i + step] - left[i]).norm());
   }
-  SlowlessFigures figures{mean(norms), root_mean_square(norms), {}};
+  SlowlessFigures figures{window_s, mean(norms), root_mean_square(norms), {}};
   if (!steps.empty()) figures.rpe_mean = mean(steps);
   return figures;
 }

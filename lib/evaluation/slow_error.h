@@ -13,6 +13,7 @@ namespace roadfix {
 std::vector<Eigen::Vector3d> without_slow_part(const std::vector<PoseError>& errors, double window_s);
 
 struct SlowlessFigures {
+  double window_s = 0.0;
   double ate_mean = 0.0;           ///< m, Lee et al. (2025), (9)
   double ate_rmse = 0.0;           ///< m
   std::optional<double> rpe_mean;  ///< m, their (10)

@@ -24,6 +24,7 @@ struct Options {
   int64_t tie_us = 0;  ///< 0: not given
   double turn_degps = 3.0;
   double usable_m = kUsableWithin;
+  double slow_s = 0.0;
   OutputOption out;  ///< a folder
   std::filesystem::path json;
 };
@@ -36,6 +37,7 @@ EvaluationRequest request_of(const Options& options) {
   out.options.fit_delay = options.fit_delay;
   out.options.turn_threshold = options.turn_degps * kDegree;
   out.options.usable_within = options.usable_m;
+  out.options.slow_window = options.slow_s;
   out.options.alignment = alignment_named(options.align);
   if (options.tie_us != 0) out.options.tie_us = options.tie_us;
   return out;
@@ -82,6 +84,12 @@ void add_evaluate_command(CLI::App& app) {
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   command->add_option("--usable-m", options->usable_m, "largest horizontal error of a pose that counts as usable")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--remove-slow-s", options->slow_s,
+          "s: says also what is left without errors that are slower, as Lee et al. (2025) scored vision (0: not)")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   add_output(*command, options->out, "folder for the report; LOG-report where not given")->required(false);

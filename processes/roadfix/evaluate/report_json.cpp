@@ -152,6 +152,11 @@ Json channel_json(const ChannelScore& c) {
         {"rmse_m", a.rmse}, {"mean_m", a.mean}, {"horizontal_rmse_m", a.horizontal_rmse}, {"scale", a.scale}};
   }
   json["ate_by_alignment"] = std::move(aligned);
+  if (c.slowless) {
+    json["slow_removed"] = {
+        {"window_s", c.slowless->window_s}, {"ate_mean_m", c.slowless->ate_mean}, {"ate_rmse_m", c.slowless->ate_rmse}};
+    if (c.slowless->rpe_mean) json["slow_removed"]["rpe_mean_m"] = *c.slowless->rpe_mean;
+  }
   json["errors"] = axes_json(c.axes);
   add_relative(c, json);
   add_transitions(c, json);

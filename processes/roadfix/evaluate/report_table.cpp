@@ -64,6 +64,11 @@ std::string trajectory_lines(const ChannelScore& c) {
   }
   text += "\n";
   if (c.rpe_mean) text += fmt::format("  RPE {} m mean over 100 samples (Lee et al., 2025)\n", number(*c.rpe_mean));
+  if (c.slowless) {
+    text += fmt::format("  without errors slower than {:g} s (by the reference): ATE {} m RMSE, {} m mean norm",
+                        c.slowless->window_s, number(c.slowless->ate_rmse), number(c.slowless->ate_mean));
+    text += c.slowless->rpe_mean ? fmt::format("; RPE {} m\n", number(*c.slowless->rpe_mean)) : "\n";
+  }
   if (c.rpe_rmse) {
     text += fmt::format("  RPE {} m, {} deg RMSE over {} samples (evo)\n", number(c.rpe_rmse->translation_rmse),
                         number(c.rpe_rmse->rotation_rmse / kDegree), c.rpe_rmse->delta);

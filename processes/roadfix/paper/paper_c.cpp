@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "config/config.h"
-#include "evaluation/slow_error.h"
 #include "geometry/frames.h"
 #include "imm_fusion/handler.h"
 #include "roadfix/evaluate/evaluate_log.h"
@@ -100,7 +99,7 @@ void add_modes(const std::string& name, const EvaluationReport& evaluation, Pape
 
 /// As the paper scored its vision: the reference has taken away what of its error is slow.
 void add_slowless(const ChannelScore& vision, double window_s, PaperReport& report) {
-  const std::optional<SlowlessFigures> figures = slowless_figures(vision.errors, window_s);
+  const std::optional<SlowlessFigures>& figures = vision.slowless;
   PaperTable::Row row{fmt::format("VIO, similarity, slower than {:.3g} s removed", window_s),
                       {{}, {}, {}, static_cast<double>(vision.pairs)}};
   if (figures) row.values = {figures->ate_mean, figures->rpe_mean, figures->ate_rmse, row.values[3]};
@@ -113,6 +112,7 @@ void add_inputs(const std::filesystem::path& poses, double slow_window, PaperRep
   request.log = poses;
   request.channels = {"POSE_INS", "POSE_VO"};
   request.alignments["POSE_VO"] = Alignment::kSim3;
+  request.options.slow_window = slow_window;
   const EvaluationReport evaluation = evaluate_log(request);
   add_drive(evaluation.reference, evaluation.facts, evaluation.notes, report);
   const auto is_scored = [&](const std::pair<double, double>& outage) { return outage.first < report.scored.second; };

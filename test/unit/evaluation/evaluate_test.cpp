@@ -116,6 +116,20 @@ TEST_CASE("usable is a pose that is near, not one that is only there") {
         Approx(0.5).margin(0.01));
 }
 
+TEST_CASE("where it is asked for, the figures are also given without the slow part of the errors, and only there") {
+  const Trajectory drifts = changed(eight_trajectory(0.0, 200.0, 0.1), [](Odometry& pose) {
+    pose.T_frame_vehicle.p.x() += 0.02 * 1e-6 * static_cast<double>(pose.t_us);
+  });
+  EvaluationOptions options;
+  options.slow_window = 10.0;
+  const ChannelScore left = evaluate_channel(exact_reference(), exact_facts(), estimate_of(drifts), options);
+  REQUIRE(left.slowless);
+  CHECK(left.slowless->window_s == 10.0);
+  CHECK(left.slowless->ate_rmse < 0.02);
+  CHECK(left.ate_rmse > 2.0);  // the pose as it was published stays what it was
+  CHECK(!evaluate_channel(exact_reference(), exact_facts(), estimate_of(drifts), {}).slowless);
+}
+
 TEST_CASE("the antenna's reference is compared with the antenna") {
   const Eigen::Vector3d lever_arm(1.2, 0.3, 1.5);
   Reference reference = exact_reference();

@@ -28,7 +28,7 @@ class Folder {
 
 void keep(double, pose_t&) {}
 
-EvaluationReport evaluate_all(const std::filesystem::path& path) {
+EvaluationReport evaluate_all(const std::filesystem::path& path, const EvaluationOptions& options = {}) {
   EvaluationLog log = read_evaluation_log(path, {});
   EvaluationReport report{log.facts, reference_of(log, path), {}, log.fusion, log.notes};
   for (auto& [channel, stream] : log.poses) {
@@ -38,7 +38,7 @@ EvaluationReport evaluate_all(const std::filesystem::path& path) {
     input.local_frame = stream.local_frame;
     input.trajectory = stream.trajectory;
     input.protection = log.protection[channel];
-    report.channels.push_back(evaluate_channel(report.reference, report.facts, input, {}));
+    report.channels.push_back(evaluate_channel(report.reference, report.facts, input, options));
   }
   return report;
 }
@@ -79,6 +79,27 @@ TEST_CASE("a log is read back to the figures that were put in") {
   CHECK(page.find("<h1>small &lt;drive></h1>") != std::string::npos);
   CHECK(page.find("http://") == page.find("http://www.w3.org/2000/svg"));  // nothing to fetch
   CHECK(page.find("https://") == std::string::npos);
+}
+
+TEST_CASE("what is left without slow errors is said beside the figures as published, by its window") {
+  const Folder folder("slow");
+  const SmallLog small;
+  {
+    LogWriter writer(folder.file("out.lcm"));
+    small.write_drive(writer);
+    small.write_estimate(writer, "POSE_INS", [](double, pose_t& m) { m.position_m[2] += 0.25; });
+    writer.commit();
+  }
+  EvaluationOptions options;
+  options.slow_window = 20.0;
+  const EvaluationReport report = evaluate_all(folder.file("out.lcm"), options);
+  const auto json = report_json(report);
+  const auto& ins = json["channels"]["POSE_INS"];
+  CHECK(ins["slow_removed"]["window_s"] == 20.0);
+  CHECK(ins["slow_removed"]["ate_rmse_m"].get<double>() < 0.01);
+  CHECK(ins["ate_rmse_m"].get<double>() == Approx(0.25));
+  CHECK(report_table(report).find("without errors slower than 20 s") != std::string::npos);
+  CHECK(!report_json(evaluate_all(folder.file("out.lcm")))["channels"]["POSE_INS"].contains("slow_removed"));
 }
 
 /// The page's data: what stands between `begin` and the next end of a script element.
