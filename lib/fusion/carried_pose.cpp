@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 namespace {
 
@@ -78,18 +76,6 @@ Eigen::Matrix3d CarriedPose::covariance(const Channels& channels) const {
 double CarriedPose::height_variance() const {
   const double sigma = kHeightShare * way_;
   return height_variance_ + kHeightFloor * kHeightFloor * sum_.dt + sigma * sigma;
-}
-
-void CarriedPose::save(StateWriter& writer) const {
-  const auto put = [&](const auto&... members) { (fusion::write(writer, members), ...); };
-  put(t_us_, pose_, P_, height_, height_variance_, way_, dt_, by_);
-  MotionSum::visit_members(sum_, put);
-}
-
-void CarriedPose::load(StateReader& reader) {
-  const auto get = [&](auto&... members) { (fusion::read(reader, members), ...); };
-  get(t_us_, pose_, P_, height_, height_variance_, way_, dt_, by_);
-  MotionSum::visit_members(sum_, get);
 }
 
 }  // namespace roadfix

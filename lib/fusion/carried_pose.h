@@ -24,8 +24,11 @@ class CarriedPose {
   [[nodiscard]] double height_variance() const;
   [[nodiscard]] double dt() const { return dt_; }  ///< s since start()
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.t_us_, self.pose_, self.P_, self.height_, self.height_variance_, self.sum_, self.way_, self.dt_,
+          self.by_);
+  }
 
  private:
   void lead(FusionChannel by, const Channels& channels);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 namespace {
 
@@ -123,20 +121,6 @@ void Failover::judge(bool condemned, bool clear, const Channels& channels, int64
   epochs_ = 0;
   trusted_[0] = trusted_[1];
   start_at(trusted_[1], ins);
-}
-
-void Failover::save(StateWriter& writer) const {
-  const auto put = [&](const auto&... members) { (fusion::write(writer, members), ...); };
-  pose_.save(writer);
-  for (const CarriedPose& pose : trusted_) pose.save(writer);
-  put(epochs_, witness_, follows_, ever_, enu_, gnss_, contradicted_, gnss_since_us_, good_since_us_, why_);
-}
-
-void Failover::load(StateReader& reader) {
-  const auto get = [&](auto&... members) { (fusion::read(reader, members), ...); };
-  pose_.load(reader);
-  for (CarriedPose& pose : trusted_) pose.load(reader);
-  get(epochs_, witness_, follows_, ever_, enu_, gnss_, contradicted_, gnss_since_us_, good_since_us_, why_);
 }
 
 }  // namespace roadfix

@@ -35,8 +35,11 @@ class Failover {
   /// Whether a correction of the INS's pose, in its frame, is one that it may not make without a fix.
   [[nodiscard]] bool implausible(const Planar& correction, const Eigen::Matrix3d& P) const;
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.pose_, self.trusted_, self.epochs_, self.witness_, self.follows_, self.ever_, self.enu_, self.gnss_,
+          self.contradicted_, self.gnss_since_us_, self.good_since_us_, self.why_);
+  }
 
  private:
   void carry(FusionChannel c, bool fresh, const Channels& channels, const LocalMotion& local, int64_t t_us);

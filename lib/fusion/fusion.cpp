@@ -265,29 +265,8 @@ VisionRestart Fusion::take_restart(const Odometry& local) {
   return restart_.take(local, channel(FusionChannel::kVo).calibration().length());
 }
 
-void Fusion::save(StateWriter& writer) const {
-  for (const PoseChannel& c : channels_) c.save(writer);
-  witnesses_.save(writer);
-  local_.save(writer);
-  failover_.save(writer);
-  restart_.save(writer);
-  output_.save(writer);
-  const auto put = [&](const auto&... members) { (write(writer, members), ...); };
-  for (const FusionChannelReport& r : reports_)
-    put(r.status, r.nis, r.dof, r.innovation, r.innovation_variance, r.weight);
-  put(t_us_, started_, epochs_, vision_bad_since_us_);
-}
+void Fusion::save(StateWriter& writer) const { SnapshotWriter{writer}(*this); }
 
-void Fusion::load(StateReader& reader) {
-  for (PoseChannel& c : channels_) c.load(reader);
-  witnesses_.load(reader);
-  local_.load(reader);
-  failover_.load(reader);
-  restart_.load(reader);
-  output_.load(reader);
-  const auto get = [&](auto&... members) { (read(reader, members), ...); };
-  for (FusionChannelReport& r : reports_) get(r.status, r.nis, r.dof, r.innovation, r.innovation_variance, r.weight);
-  get(t_us_, started_, epochs_, vision_bad_since_us_);
-}
+void Fusion::load(StateReader& reader) { SnapshotReader{reader}(*this); }
 
 }  // namespace roadfix

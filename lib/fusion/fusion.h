@@ -29,6 +29,10 @@ struct FusionChannelReport {
   Eigen::Vector3d innovation = Eigen::Vector3d::Zero();
   Eigen::Vector3d innovation_variance = Eigen::Vector3d::Zero();
   double weight = 0.0;  ///< share of the reliability, [0, 1]
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.status, self.nis, self.dof, self.innovation, self.innovation_variance, self.weight);
+  }
 };
 
 class Fusion {
@@ -74,6 +78,11 @@ class Fusion {
 
   void save(StateWriter& writer) const;
   void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.channels_, self.witnesses_, self.local_, self.failover_, self.restart_, self.output_, self.reports_,
+          self.t_us_, self.started_, self.epochs_, self.vision_bad_since_us_);
+  }
 
  private:
   [[nodiscard]] PoseChannel& at(FusionChannel c) { return channels_[static_cast<std::size_t>(c)]; }

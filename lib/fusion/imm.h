@@ -19,12 +19,20 @@ struct Mode {
   MotionKind kind = MotionKind::kConstantAcceleration;
   FusionEstimate estimate;
   double log_likelihood = 0.0;  ///< of this step's measurements
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.kind, self.estimate, self.log_likelihood);
+  }
 };
 
 struct Imm {
   std::array<Mode, kModes> modes{Mode{MotionKind::kConstantAcceleration, {}, 0.0},
                                  Mode{MotionKind::kConstantTurn, {}, 0.0}};
   Eigen::Vector2d probability = Eigen::Vector2d(0.5, 0.5);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.modes, self.probability);
+  }
 };
 
 struct ModeDurations {

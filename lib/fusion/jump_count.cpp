@@ -29,20 +29,4 @@ void JumpCount::add(const Odometry& fused, const Odometry& local, bool enu, doub
   local_height_ = local_height;
 }
 
-void JumpCount::save(StateWriter& writer) const {
-  writer.put(started_);
-  writer.put(enu_);
-  writer.put(count_);
-  for (const Planar* p : {&last_, &fused_, &local_}) writer.put(*p);
-  for (const double v : {last_height_, height_, local_height_}) writer.put(v);
-}
-
-void JumpCount::load(StateReader& reader) {
-  reader.get(started_);
-  reader.get(enu_);
-  reader.get(count_);
-  for (Planar* p : {&last_, &fused_, &local_}) reader.get(*p);
-  for (double* v : {&last_height_, &height_, &local_height_}) reader.get(*v);
-}
-
 }  // namespace roadfix

@@ -15,8 +15,11 @@ class JumpCount {
   [[nodiscard]] const Planar& last() const { return last_; }  ///< new minus old
   [[nodiscard]] double last_height() const { return last_height_; }
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.started_, self.enu_, self.count_, self.last_, self.last_height_, self.fused_, self.local_, self.height_,
+          self.local_height_);
+  }
 
  private:
   bool started_ = false;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 
 using namespace fusion;
@@ -140,23 +138,6 @@ Odometry LocalMotion::attitude(const Channels& channels, int64_t t_us) const {
   const double unknown = config_.motion.jerk * std::pow(ahead, 1.5);
   o.cov_velocity(0, 0) += unknown * unknown / 3.0;
   return o;
-}
-
-void LocalMotion::save(StateWriter& writer) const {
-  const auto put = [&](const auto&... members) { (write(writer, members), ...); };
-  put(leader_, velocity_, imm_.probability, imm_us_, led_us_);
-  for (const Mode& mode : imm_.modes) put(mode.estimate, mode.log_likelihood);
-  visit_odometry(attitude_, put);
-  pose_.save(writer);
-}
-
-void LocalMotion::load(StateReader& reader) {
-  const auto get = [&](auto&... members) { (read(reader, members), ...); };
-  get(leader_, velocity_, imm_.probability, imm_us_, led_us_);
-  for (Mode& mode : imm_.modes) get(mode.estimate, mode.log_likelihood);
-  visit_odometry(attitude_, get);
-  pose_.load(reader);
-  combined_ = combine(imm_);
 }
 
 }  // namespace roadfix

@@ -34,8 +34,11 @@ class LocalMotion {
   /// Roll, pitch, velocity and rates of the channels that are relied on, for t_us; the pose itself is not filled in.
   [[nodiscard]] Odometry attitude(const Channels& channels, int64_t t_us) const;
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.leader_, self.velocity_, self.pose_, self.imm_, self.combined_, self.imm_us_, self.led_us_,
+          self.attitude_);
+  }
 
  private:
   [[nodiscard]] std::optional<FusionChannel> choose(const Channels& channels, int64_t t_us, bool with_ins,

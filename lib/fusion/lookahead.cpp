@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 namespace {
 
@@ -62,27 +60,6 @@ std::optional<Lookahead::Ahead> Lookahead::from(int64_t t_us) const {
   a.rise = newest.rise - last_->rise - last_->view.velocity.z() * seconds_between(last_->view.t_us, t_us);
   a.correction = newest.corrected - last_->corrected;
   return a;
-}
-
-void Lookahead::save(StateWriter& writer) const {
-  const auto put = [&](const auto&... members) { (fusion::write(writer, members), ...); };
-  put(last_.has_value());
-  if (!last_) return;
-  put(last_->sample.channel, last_->sample.reset_counter, last_->sample.enu, last_->way, last_->rise, last_->corrected);
-  fusion::visit_odometry(last_->sample.odometry, put);
-}
-
-void Lookahead::load(StateReader& reader) {
-  const auto get = [&](auto&... members) { (fusion::read(reader, members), ...); };
-  ahead_.clear();
-  last_.reset();
-  bool has = false;
-  get(has);
-  if (!has) return;
-  Entry& e = last_.emplace();
-  get(e.sample.channel, e.sample.reset_counter, e.sample.enu, e.way, e.rise, e.corrected);
-  fusion::visit_odometry(e.sample.odometry, get);
-  e.view = level_view(e.sample.odometry);
 }
 
 }  // namespace roadfix

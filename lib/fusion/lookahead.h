@@ -30,9 +30,11 @@ class Lookahead {
   [[nodiscard]] std::optional<Ahead> from(int64_t t_us) const;
   [[nodiscard]] std::optional<int64_t> newest_us() const;
 
-  /// What was dropped last, from which sums start; load() forgets the samples ahead: they come again.
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  /// What was dropped last, from which sums start; the samples ahead come again.
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.last_);
+  }
 
  private:
   struct Entry {
@@ -42,6 +44,10 @@ class Lookahead {
     double rise = 0.0;
     bool joined = false;                ///< to its predecessor: same channel and map, both valid
     Planar corrected = Planar::Zero();  ///< summed likewise, in the channel's frame
+    template <class Self, class Visitor>
+    static void visit_members(Self& self, const Visitor& visit) {
+      visit(self.sample, self.view, self.way, self.rise, self.joined, self.corrected);
+    }
   };
   std::optional<Entry> last_;  ///< the newest of those dropped
   std::deque<Entry> ahead_;

@@ -27,6 +27,10 @@ using Matrix = Eigen::Matrix<double, kSize, kSize>;
 struct FusionEstimate {
   fusion::Vector x = fusion::Vector::Zero();
   fusion::Matrix P = fusion::Matrix::Zero();
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.x, self.P);
+  }
 };
 
 /// a - b with the yaws the short way round.

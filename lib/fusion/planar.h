@@ -21,6 +21,10 @@ struct LevelView {
   Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s, in level axes, x along the yaw
   double turn = 0.0;                                   ///< rad/s, yaw rate of the level axes
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.t_us, self.pose, self.P, self.velocity, self.turn);
+  }
 };
 LevelView level_view(const Odometry& odometry);
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 namespace {
 
@@ -200,42 +198,6 @@ void PoseChannel::adapt(const Planar& residual, const Planar& motion, double dt,
   one(factors_(0), 0.5 * residual.head<2>().squaredNorm(), 0.5 * reference.topLeftCorner<2, 2>().trace(),
       0.5 * own.topLeftCorner<2, 2>().trace());
   one(factors_(1), square(residual.z()), reference(2, 2), own(2, 2));
-}
-
-template <class Self, class Visitor>
-void PoseChannel::visit_members(Self& self, const Visitor& visit) {
-  ChannelCalibration::visit_members(self.calibration_, visit);
-  visit(self.before_us_, self.step_, self.rise_, self.track_, self.correction_, self.P_before_, self.factors_,
-        self.ever_us_, self.repeated_since_us_, self.segment_, self.reset_counter_, self.trial_left_, self.drift_,
-        self.metric_, self.enu_, self.lengths_of_wheels_, self.invalid_, self.frozen_, self.contradicted_,
-        self.was_reset_);
-}
-
-void PoseChannel::save(StateWriter& writer) const {
-  const auto put = [&](const auto&... members) { (fusion::write(writer, members), ...); };
-  visit_members(*this, put);
-  put(static_cast<int64_t>(recent_.size()));
-  for (const TrackPoint& point : recent_) put(point.t_us, point.track);
-  put(last_.has_value());
-  if (last_) fusion::visit_odometry(*last_, put);
-}
-
-void PoseChannel::load(StateReader& reader) {
-  const auto get = [&](auto&... members) { (fusion::read(reader, members), ...); };
-  visit_members(*this, get);
-  int64_t points = 0;
-  get(points);
-  recent_.clear();
-  for (int64_t i = 0; i < points; ++i) {
-    TrackPoint& point = recent_.emplace_back();
-    get(point.t_us, point.track);
-  }
-  bool has = false;
-  get(has);
-  last_.reset();
-  if (!has) return;
-  fusion::visit_odometry(last_.emplace(), get);
-  view_ = level_view(*last_);
 }
 
 }  // namespace roadfix

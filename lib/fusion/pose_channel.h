@@ -25,6 +25,11 @@ struct ChannelSample {
   bool lengths_of_wheels = false;  ///< of a vision: no second witness of the way's length beside the wheels
   bool by_velocity = false;        ///< of a filter, whose poses hold corrections: its velocities are its motion
   int64_t seq = 0;
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.channel, self.odometry, self.reset_counter, self.metric, self.enu, self.lengths_of_wheels,
+          self.by_velocity, self.seq);
+  }
 };
 
 enum class FuseStatus { kAccepted, kGated, kNotReady, kBadInput, kBadQuality, kReset, kDisabled };
@@ -100,12 +105,15 @@ class PoseChannel {
   [[nodiscard]] const Eigen::Matrix3d& covariance_before() const { return P_before_; }
   [[nodiscard]] bool was_reset() const { return was_reset_; }
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.calibration_, self.last_, self.view_, self.before_us_, self.step_, self.rise_, self.track_, self.recent_,
+          self.correction_, self.P_before_, self.factors_, self.ever_us_, self.repeated_since_us_, self.segment_,
+          self.reset_counter_, self.trial_left_, self.drift_, self.metric_, self.enu_, self.lengths_of_wheels_,
+          self.invalid_, self.frozen_, self.contradicted_, self.was_reset_);
+  }
 
  private:
-  template <class Self, class Visitor>
-  static void visit_members(Self& self, const Visitor& visit);
   [[nodiscard]] double since(int64_t t_us) const { return seconds_between(view_.t_us, t_us); }
   void begin_segment();
   void measure(const LevelView& now, double z, const ChannelSample& sample);
@@ -114,6 +122,10 @@ class PoseChannel {
   struct TrackPoint {
     int64_t t_us = 0;
     Planar track = Planar::Zero();
+    template <class Self, class Visitor>
+    static void visit_members(Self& self, const Visitor& visit) {
+      visit(self.t_us, self.track);
+    }
   };
 
   FusionChannel channel_;

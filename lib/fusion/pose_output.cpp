@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 
 using namespace fusion;
@@ -142,18 +140,6 @@ std::string PoseOutput::reason(const FusionNow& now) {
   for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel})
     if (now.channel(c).state(now.t_us) == ChannelState::kContradicted) say(std::string(name_of(c)) + " contradicts");
   return text;
-}
-
-void PoseOutput::save(StateWriter& writer) const {
-  jumps_.save(writer);
-  writer.put(validity_);
-  writer.put(better_for_);
-}
-
-void PoseOutput::load(StateReader& reader) {
-  jumps_.load(reader);
-  reader.get(validity_);
-  reader.get(better_for_);
 }
 
 }  // namespace roadfix

@@ -53,8 +53,10 @@ class PoseOutput {
   /// In plain words, what keeps POSE_FUSED from being the INS's pose with fixes; empty where nothing does.
   [[nodiscard]] static std::string reason(const FusionNow& now);
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.jumps_, self.validity_, self.better_for_);
+  }
 
  private:
   [[nodiscard]] FusionReport report(const FusionNow& now) const;

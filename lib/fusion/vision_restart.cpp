@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 namespace {
 
@@ -41,28 +39,6 @@ VisionRestart VisionRestartRequest::take(const Odometry& local, double length) {
   r.cov_pose(2, 2) /= length * length;
   r.reason.swap(reason_);
   return r;
-}
-
-void VisionRestartRequest::save(StateWriter& writer) const {
-  writer.put(tied_);
-  for (const SE3* T : {&T_vo_vehicle_, &T_local_vehicle_}) {
-    writer.put(T->q.coeffs());
-    writer.put(T->p);
-  }
-  writer.put(cov_local_);
-  writer.put(asked_us_);
-  writer.put(reason_);
-}
-
-void VisionRestartRequest::load(StateReader& reader) {
-  reader.get(tied_);
-  for (SE3* T : {&T_vo_vehicle_, &T_local_vehicle_}) {
-    reader.get(T->q.coeffs());
-    reader.get(T->p);
-  }
-  reader.get(cov_local_);
-  reader.get(asked_us_);
-  reader.get(reason_);
 }
 
 }  // namespace roadfix

@@ -27,8 +27,10 @@ class VisionRestartRequest {
   /// `length`: true metres per metre of the vision.
   [[nodiscard]] VisionRestart take(const Odometry& local, double length);
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.tied_, self.T_vo_vehicle_, self.T_local_vehicle_, self.cov_local_, self.asked_us_, self.reason_);
+  }
 
  private:
   bool tied_ = false;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fusion/saved.h"
-
 namespace roadfix {
 namespace {
 
@@ -122,59 +120,5 @@ const Witnesses::Comparison& Witnesses::comparison(FusionChannel a, FusionChanne
 }
 
 double Witnesses::nis(FusionChannel a, FusionChannel b) const { return comparison(a, b).nis; }
-
-void Witnesses::save(StateWriter& writer) const {
-  writer.put(static_cast<int64_t>(history_.size()));
-  for (const Epoch& e : history_) {
-    writer.put(e.t_us);
-    for (const Witness& w : e.channels) {
-      writer.put(w.comparable);
-      writer.put(w.segment);
-      writer.put(w.track);
-      writer.put(w.P);
-      writer.put(w.velocity_variance);
-      writer.put(w.drift_variance);
-    }
-  }
-  for (const Pair& p : pairs_) {
-    for (const State& s : p.states) {
-      writer.put(s.contradict);
-      writer.put(s.count);
-    }
-    writer.put(p.last.done);
-    writer.put(p.last.fits);
-    writer.put(p.last.nis);
-    writer.put(p.last.difference);
-    writer.put(p.last.S);
-  }
-}
-
-void Witnesses::load(StateReader& reader) {
-  history_.clear();
-  const auto n = reader.get<int64_t>();
-  for (int64_t k = 0; k < n; ++k) {
-    Epoch& e = history_.emplace_back();
-    reader.get(e.t_us);
-    for (Witness& w : e.channels) {
-      reader.get(w.comparable);
-      reader.get(w.segment);
-      reader.get(w.track);
-      reader.get(w.P);
-      reader.get(w.velocity_variance);
-      reader.get(w.drift_variance);
-    }
-  }
-  for (Pair& p : pairs_) {
-    for (State& s : p.states) {
-      reader.get(s.contradict);
-      reader.get(s.count);
-    }
-    reader.get(p.last.done);
-    reader.get(p.last.fits);
-    reader.get(p.last.nis);
-    reader.get(p.last.difference);
-    reader.get(p.last.S);
-  }
-}
 
 }  // namespace roadfix

@@ -19,11 +19,19 @@ struct Witness {
   Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
   double velocity_variance = 0.0;  ///< m2/s2
   double drift_variance = 0.0;     ///< rad2/s2
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.comparable, self.segment, self.track, self.P, self.velocity_variance, self.drift_variance);
+  }
 };
 
 struct Epoch {
   int64_t t_us = 0;
   std::array<Witness, kFusionChannels> channels;
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.t_us, self.channels);
+  }
 };
 
 struct WindowMotion {
@@ -56,14 +64,20 @@ class Witnesses {
     double nis = 0.0;
     Planar difference = Planar::Zero();
     Eigen::Matrix3d S = Eigen::Matrix3d::Zero();
+    template <class Self, class Visitor>
+    static void visit_members(Self& self, const Visitor& visit) {
+      visit(self.done, self.fits, self.nis, self.difference, self.S);
+    }
   };
   [[nodiscard]] const Comparison& comparison(FusionChannel a, FusionChannel b) const;
   /// Of one channel over the last `epochs` epochs; nothing where it was not there, or not of one segment, all the time.
   [[nodiscard]] std::optional<WindowMotion> window(FusionChannel c, int epochs, const Channels& channels) const;
   [[nodiscard]] int epochs() const { return static_cast<int>(history_.size()); }
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Visitor>
+  static void visit_members(Self& self, const Visitor& visit) {
+    visit(self.history_, self.pairs_);
+  }
 
   static constexpr double kSpacing = 0.5;  ///< s, between epochs
   static constexpr int kShort = 2;         ///< epochs: 1 s
@@ -74,10 +88,18 @@ class Witnesses {
   struct State {
     bool contradict = false;
     int count = 0;  ///< comparisons in a row for a change
+    template <class Self, class Visitor>
+    static void visit_members(Self& self, const Visitor& visit) {
+      visit(self.contradict, self.count);
+    }
   };
   struct Pair {
     std::array<State, 2> states;  ///< short and long window
     Comparison last;
+    template <class Self, class Visitor>
+    static void visit_members(Self& self, const Visitor& visit) {
+      visit(self.states, self.last);
+    }
   };
   void compare(Pair& pair, FusionChannel a, FusionChannel b, const Channels& channels);
   void judge(State& state, double nis) const;

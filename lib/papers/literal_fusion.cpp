@@ -182,35 +182,15 @@ std::optional<Odometry> LiteralFusion::carried(const Fusion& fusion, const Odome
 
 template <class Self, class Visitor>
 void LiteralFusion::visit_members(Self& self, const Visitor& visit) {
-  visit(self.imm_.probability, self.ramp_.gnss, self.ramp_.changed_us, self.ramp_.level_at_change, self.last_tie_us_,
-        self.t_us_, self.resets_, self.started_, self.gnss_);
-  for (auto& mode : self.imm_.modes) visit(mode.estimate, mode.log_likelihood);
+  visit(self.imm_, self.ramp_.gnss, self.ramp_.changed_us, self.ramp_.level_at_change, self.last_tie_us_, self.t_us_,
+        self.resets_, self.started_, self.gnss_, self.attitude_, self.tie_, self.waiting_);
   for (auto& m : self.memories_) visit(m.check.ratio, m.first, m.used, m.refused);
   for (auto& r : self.reports_)
     visit(r.status, r.alpha, r.innovation.nis, r.innovation.innovation, r.innovation.variance);
-  visit_odometry(self.attitude_, visit);
-  FrameTie::visit_members(self.tie_, visit);
 }
 
-void LiteralFusion::save(StateWriter& writer) const {
-  const auto put = [&](const auto&... members) { (write(writer, members), ...); };
-  visit_members(*this, put);
-  put(waiting_.has_value());
-  if (!waiting_) return;
-  put(waiting_->reset_counter, waiting_->metric, waiting_->enu, waiting_->seq);
-  visit_odometry(waiting_->odometry, put);
-}
+void LiteralFusion::save(StateWriter& writer) const { visit_members(*this, SnapshotWriter(writer)); }
 
-void LiteralFusion::load(StateReader& reader) {
-  const auto get = [&](auto&... members) { (read(reader, members), ...); };
-  visit_members(*this, get);
-  waiting_.reset();
-  bool has = false;
-  get(has);
-  if (!has) return;
-  ChannelSample& s = waiting_.emplace();
-  get(s.reset_counter, s.metric, s.enu, s.seq);
-  visit_odometry(s.odometry, get);
-}
+void LiteralFusion::load(StateReader& reader) { visit_members(*this, SnapshotReader(reader)); }
 
 }  // namespace roadfix

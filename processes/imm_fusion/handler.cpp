@@ -8,6 +8,7 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "fusion/fusion.h"
+#include "fusion/saved.h"
 #include "geodesy/enu_change.h"
 #include "imm_fusion/messages.h"
 
@@ -50,7 +51,7 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.state_layout = 8;
+    spec_.state_layout = 9;
     // Vision counts when it is 150 ms old, so that the others need not wait for it.
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0},
                     {"POSE_INS", "pose_t", 0, 0},
@@ -135,7 +136,7 @@ class ImmFusionStage final : public Stage {
     }
     fusion_.save(writer);
     literal_.save(writer);
-    lookahead_.save(writer);
+    fusion::SnapshotWriter{writer}(lookahead_);
     return writer.take();
   }
 
@@ -158,7 +159,7 @@ class ImmFusionStage final : public Stage {
     }
     loaded.fusion_.load(reader);
     loaded.literal_.load(reader);
-    loaded.lookahead_.load(reader);
+    fusion::SnapshotReader{reader}(loaded.lookahead_);
     reader.finish();
     *this = std::move(loaded);
   }
