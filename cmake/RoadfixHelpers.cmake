@@ -36,6 +36,17 @@ add_library(roadfix_pch OBJECT ${PROJECT_BINARY_DIR}/roadfix_pch.cpp)
 target_link_libraries(roadfix_pch PRIVATE roadfix_options roadfix_eigen)
 target_precompile_headers(roadfix_pch PRIVATE <Eigen/Dense> <algorithm> <cstdint> <map> <optional> <string> <vector>)
 
+# Below this line of the caller, sources are compiled eight at a time: the headers and templates that they share are most of the work.
+# GCC would warn of classes with members of an unnamed namespace, as it should where a header has them; here it takes sources for headers.
+macro(roadfix_unity)
+  if(ROADFIX_UNITY)
+    set(CMAKE_UNITY_BUILD ON)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      add_compile_options(-Wno-subobject-linkage)
+    endif()
+  endif()
+endmacro()
+
 # roadfix_library(NAME SOURCES a.cpp ... DEPS geometry ... SYSTEM_DEPS target ...) makes the target roadfix_NAME, included as "NAME/header.h".
 # A library without sources is header-only. DEPS are Roadfix libraries, public.
 function(roadfix_library NAME)

@@ -31,7 +31,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-std::string degrees(double radians) { return fmt::format("{:.9f}", radians / kDegree); }  // 0.1 mm
+std::string coordinate(double radians) { return fmt::format("{:.9f}", radians / kDegree); }  // 0.1 mm
 
 struct Place {
   int64_t t_us = 0;
@@ -59,7 +59,7 @@ std::vector<Stretch> stretches(const Trajectory& trajectory, const Geodetic& anc
 
 /// Longitude, latitude and where it is known height, as KML has them.
 std::string coordinates(const Place& p) {
-  std::string text = degrees(p.geodetic.longitude) + "," + degrees(p.geodetic.latitude);
+  std::string text = coordinate(p.geodetic.longitude) + "," + coordinate(p.geodetic.latitude);
   if (p.sea_level.height_m) text += fmt::format(",{:.3f}", *p.sea_level.height_m);
   return text + "\n";
 }
@@ -96,7 +96,8 @@ void write_gpx(std::ostream& out, const Trajectory& trajectory, const Geodetic& 
     if (wanted != open) out << (wanted ? "<trkseg>\n" : "</trkseg>\n");
     open = wanted;
     for (const Place& p : stretch.places) {
-      out << "<trkpt lat=\"" << degrees(p.geodetic.latitude) << "\" lon=\"" << degrees(p.geodetic.longitude) << "\">";
+      out << "<trkpt lat=\"" << coordinate(p.geodetic.latitude) << "\" lon=\"" << coordinate(p.geodetic.longitude)
+          << "\">";
       if (p.sea_level.height_m) out << fmt::format("<ele>{:.3f}</ele>", *p.sea_level.height_m);
       out << "<time>" << iso_time(p.t_us) << "</time>";
       if (p.sea_level.separation_m) out << fmt::format("<geoidheight>{:.3f}</geoidheight>", *p.sea_level.separation_m);

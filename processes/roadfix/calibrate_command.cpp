@@ -32,12 +32,12 @@ constexpr double kLargestOffset = 0.35;    // s
 constexpr double kLeastTurnStd_deg = 0.3;  // what sideslip and a mean pitch leave open, whatever the scatter says
 constexpr double kLeastOffsetStd = 0.002;  // s
 
-struct Options {
+struct CalibrateOptions {
   std::filesystem::path log, vehicle;
   bool dry = false;
 };
 
-struct Drive {
+struct CalibrationDrive {
   std::vector<ImuSample> imu;
   std::vector<msckf::SeenFrame> frames;
 };
@@ -56,10 +56,10 @@ void each(LogReader& reader, const std::string& channel, const Use& use) {
   for (const auto& [utime, offset] : events) use(decode<Message>(reader.at(offset).data));
 }
 
-Drive read_drive(const Options& options, const Calibration& calibration) {
+CalibrationDrive read_drive(const CalibrateOptions& options, const Calibration& calibration) {
   LogReader reader(options.log);
   require_our_log(reader);
-  Drive drive;
+  CalibrationDrive drive;
   each<imu_t>(reader, "IMU", [&](const imu_t& m) {
     if (drive.imu.empty() || m.utime > drive.imu.back().t_us) drive.imu.push_back(imu_sample(m));
   });
@@ -75,11 +75,11 @@ Drive read_drive(const Options& options, const Calibration& calibration) {
   return drive;
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateOptions& options) {
   fix_opencv_threads();
   Calibration calibration = load_calibration(options.vehicle);
   const SE3 before = camera_rig(calibration).T_vehicle_left;  // names what is missing
-  const Drive drive = read_drive(options, calibration);
+  const CalibrationDrive drive = read_drive(options, calibration);
   const auto found = msckf::calibrate_camera_imu(drive.frames, drive.imu, kLargestOffset, Eigen::Matrix3d::Identity());
   if (!found) {
     throw std::runtime_error(options.log.string() +
@@ -113,7 +113,7 @@ void add_calibrate_command(CLI::App& app) {
   command->require_subcommand(1);
   CLI::App* camera_imu =
       command->add_subcommand("camera-imu", "Rotation and time offset of the left camera against the IMU");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateOptions>();
   camera_imu->add_option("log", options->log, "a drive log with IMU and CAMERA_LEFT")
       ->required()
       ->check(CLI::ExistingFile);

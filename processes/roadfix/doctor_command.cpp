@@ -11,14 +11,14 @@
 namespace roadfix {
 namespace {
 
-struct Options {
+struct DoctorOptions {
   std::string url;
   std::filesystem::path log_folder = ".";
   double wanted_gib = 10.0;
   bool loopback = true;
 };
 
-void run(const Options& options) {
+void run_doctor(const DoctorOptions& options) {
   const BusUrl url = parse_bus_url(options.url);
   std::vector<Finding> findings;
   const auto add = [&](const std::vector<Finding>& more) { findings.insert(findings.end(), more.begin(), more.end()); };
@@ -42,7 +42,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_doctor_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DoctorOptions>();
   const char* url = std::getenv("LCM_DEFAULT_URL");
   options->url = url != nullptr ? url : "udpm://239.255.76.67:7667?ttl=0";
   CLI::App* command = app.add_subcommand("doctor",
@@ -55,7 +55,7 @@ void add_doctor_command(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("!--no-loopback", options->loopback, "send nothing, not even to ourselves");
   command->footer("Exit status: 0 the bus works (warnings too), 1 it does not, 2 wrong usage.");
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_doctor(*options); });
 }
 
 }  // namespace roadfix

@@ -15,7 +15,7 @@
 namespace roadfix {
 namespace {
 
-struct Options {
+struct EvaluateOptions {
   std::filesystem::path log;
   std::filesystem::path reference;
   std::vector<std::string> channels;
@@ -29,7 +29,7 @@ struct Options {
   std::filesystem::path json;
 };
 
-EvaluationRequest request_of(const Options& options) {
+EvaluationRequest request_of(const EvaluateOptions& options) {
   EvaluationRequest out;
   out.log = options.log;
   out.reference = options.reference;
@@ -43,7 +43,7 @@ EvaluationRequest request_of(const Options& options) {
   return out;
 }
 
-void run(const Options& options) {
+void run_evaluate(const EvaluateOptions& options) {
   std::filesystem::path folder = options.out.path;
   if (folder.empty()) folder = options.log.parent_path() / (options.log.stem().string() + "-report");
   const std::filesystem::path page = folder / "report.html";
@@ -63,7 +63,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_evaluate_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EvaluateOptions>();
   CLI::App* command =
       app.add_subcommand("evaluate", "Score the poses of a log against its reference: table, JSON, page");
   command->add_option("log", options->log, "what a replay or a drive wrote")->required()->check(CLI::ExistingFile);
@@ -94,7 +94,7 @@ void add_evaluate_command(CLI::App& app) {
       ->capture_default_str();
   add_output(*command, options->out, "folder for the report; LOG-report where not given")->required(false);
   command->add_option("--json", options->json, "a copy of the figures");
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_evaluate(*options); });
 }
 
 }  // namespace roadfix

@@ -19,7 +19,7 @@
 namespace roadfix {
 namespace {
 
-struct Options {
+struct ExportOptions {
   std::filesystem::path log;
   std::string channel = "POSE_FUSED";
   std::string format = "tum";
@@ -28,7 +28,7 @@ struct Options {
 };
 
 /// Poses are above the ellipsoid unless the receiver that anchored them was above the sea.
-SeaLevelOf sea_level_of(const Calibration& calibration, const Options& options) {
+SeaLevelOf sea_level_of(const Calibration& calibration, const ExportOptions& options) {
   const HeightKind kind = calibration.sensors.gnss ? calibration.sensors.gnss->height.value_or(HeightKind::kEllipsoid)
                                                    : HeightKind::kEllipsoid;
   if (kind == HeightKind::kMeanSeaLevel) return [](const Geodetic& g) { return SeaLevel{g.height, {}}; };
@@ -47,7 +47,7 @@ SeaLevelOf sea_level_of(const Calibration& calibration, const Options& options) 
   };
 }
 
-void write(std::ostream& out, const PoseStream& stream, const Options& options, const Calibration& calibration) {
+void write(std::ostream& out, const PoseStream& stream, const ExportOptions& options, const Calibration& calibration) {
   if (options.format == "tum") {
     write_tum(out, stream.trajectory);
   } else if (options.format == "kitti") {
@@ -66,7 +66,7 @@ void write(std::ostream& out, const PoseStream& stream, const Options& options, 
 }
 
 /// The whole log; messages go to standard error, where the file may not be.
-void run_mcap(const Options& options) {
+void run_mcap(const ExportOptions& options) {
   LogReader log(options.log);
   OutputFile out(options.out.path);
   const McapSummary summary = write_mcap(log, [&](std::span<const uint8_t> bytes) { out.write(bytes); });
@@ -75,7 +75,7 @@ void run_mcap(const Options& options) {
   if (!out.is_standard_output()) std::cout << options.out.path.string() << "\n";
 }
 
-void run(const Options& options) {
+void run_export(const ExportOptions& options) {
   options.out.refuse_existing(options.log);
   if (options.format == "mcap") return run_mcap(options);
   const EvaluationLog log = read_evaluation_log(options.log, {options.channel});
@@ -90,7 +90,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_export_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExportOptions>();
   CLI::App* command = app.add_subcommand(
       "export", "Write a channel's poses as TUM, KITTI, CSV, GeoJSON, GPX or KML, or a whole log as MCAP");
   command->add_option("log", options->log, "a log with poses")->required()->check(CLI::ExistingFile);
@@ -102,7 +102,7 @@ void add_export_command(CLI::App& app) {
   command->add_option("--geoid", options->geoid, "GPX, KML: auto, none, or one of GeographicLib's, egm96-5 for example")
       ->capture_default_str();
   add_output(*command, options->out, "the file to write; MCAP: - for standard output");
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_export(*options); });
 }
 
 }  // namespace roadfix

@@ -21,7 +21,7 @@ namespace {
 constexpr const char* kStatuses =
     "Exit status: 0 done; 1 a task has failed or has no result; 2 not done, standard error says why; 130 interrupted.";
 
-struct RunOptions {
+struct FleetRunOptions {
   FleetRequest request;
   OutputOption out;  ///< RUN
   std::string config;
@@ -53,7 +53,7 @@ std::vector<std::string> folders_matching(const std::string& pattern) {
   return folders;
 }
 
-void read_alignments(const RunOptions& options, FleetPlan& plan) {
+void read_alignments(const FleetRunOptions& options, FleetPlan& plan) {
   for (const std::string& word : options.aligned) {
     const std::size_t equals = word.find('=');
     if (equals == std::string::npos) throw std::runtime_error("--align " + word + ": must be CHANNEL=ALIGNMENT");
@@ -65,7 +65,7 @@ void finish(int status) {
   if (status != 0) throw CLI::RuntimeError(status);
 }
 
-void run(RunOptions& options) {
+void run_fleet(FleetRunOptions& options) {
   FleetRequest& request = options.request;
   if (!options.config.empty() && !options.configs.empty())
     throw std::runtime_error("--config and --configs: one of them");
@@ -161,7 +161,7 @@ void add_engine_options(CLI::App& command, EngineOptions& engine) {
       ->allow_extra_args(false);
 }
 
-void add_task_options(CLI::App& command, RunOptions& options) {
+void add_task_options(CLI::App& command, FleetRunOptions& options) {
   FleetPlan& plan = options.request.plan;
   add_stages(command, plan.stages, "Stages, separated by commas")->required();
   command.add_option("--config", options.config,
@@ -223,7 +223,7 @@ void add_compare_command(CLI::App& fleet) {
 void add_fleet_command(CLI::App& app) {
   CLI::App* fleet = app.add_subcommand("fleet", "Many drives: replay and score them all, compare two builds, resume");
   fleet->require_subcommand(1);
-  const auto run_options = std::make_shared<RunOptions>();
+  const auto run_options = std::make_shared<FleetRunOptions>();
   CLI::App* start = fleet->add_subcommand("run", "Replay and score drives, each a task of its own");
   start
       ->add_option("drives", run_options->request.drives,
@@ -233,7 +233,7 @@ void add_fleet_command(CLI::App& app) {
   start->footer(kStatuses);
   add_task_options(*start, *run_options);
   add_engine_options(*start, run_options->engine);
-  start->callback([run_options] { run(*run_options); });
+  start->callback([run_options] { run_fleet(*run_options); });
 
   const auto folder_options = std::make_shared<FolderOptions>();
   CLI::App* shown = add_folder_command(*fleet, "status", "How far a run is, what failed and why", *folder_options);

@@ -17,7 +17,7 @@
 namespace roadfix {
 namespace {
 
-struct Options {
+struct ImportOptions {
   std::filesystem::path source;
   OutputOption out;
   std::filesystem::path vehicle;
@@ -34,7 +34,7 @@ struct Options {
 };
 
 /// What was asked for, from the flags that were given.
-void collect(const CLI::App& command, Options& options) {
+void collect(const CLI::App& command, ImportOptions& options) {
   GnssChanges& gnss = options.changes.gnss;
   if (command.count("--cut-gnss") > 0) gnss.cut = options.cut;
   if (command.count("--gnss-spike") > 0) gnss.spike = options.spike;
@@ -54,7 +54,7 @@ void collect(const CLI::App& command, Options& options) {
   }
 }
 
-void run(Options& options) {
+void run_import(ImportOptions& options) {
   options.out.refuse_existing(options.source);
   if (options.read.format.empty()) {
     options.read.format = detect_format(options.source);
@@ -98,7 +98,7 @@ void run(Options& options) {
   if (!options.vehicle.empty()) std::cout << "vehicle: " << options.vehicle.string() << "\n";
 }
 
-void add_gnss_flags(CLI::App& command, Options& options) {
+void add_gnss_flags(CLI::App& command, ImportOptions& options) {
   const auto positive = CLI::PositiveNumber;
   auto* cut =
       command.add_option("--cut-gnss", options.cut.length, "withhold all fixes for so long, s")->check(positive);
@@ -126,7 +126,7 @@ void add_gnss_flags(CLI::App& command, Options& options) {
 }  // namespace
 
 void add_import_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ImportOptions>();
   CLI::App* command = app.add_subcommand("import", "Make a drive log and a vehicle configuration from a recording");
   command->add_option("source", options->source, "a folder, a ROS bag, or a file of poses")->required();
   add_output(*command, options->out, "the log to write");
@@ -153,7 +153,7 @@ void add_import_command(CLI::App& app) {
   add_gnss_flags(*command, *options);
   command->callback([command, options] {
     collect(*command, *options);
-    run(*options);
+    run_import(*options);
   });
 }
 

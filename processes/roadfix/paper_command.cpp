@@ -15,7 +15,7 @@
 namespace roadfix {
 namespace {
 
-struct Options {
+struct PaperOptions {
   PaperRequest drive;
   double turn_degps = 3.0;
   double least_turn_deg = 45.0;
@@ -25,9 +25,9 @@ struct Options {
   bool progress = false;
 };
 
-using Experiment = PaperReport (*)(const Options&);
+using Experiment = PaperReport (*)(const PaperOptions&);
 
-void run(const std::string& letter, Experiment experiment, Options& options) {
+void run_paper(const std::string& letter, Experiment experiment, PaperOptions& options) {
   const std::filesystem::path& drive = options.drive.drive;
   std::filesystem::path folder = options.out.path;
   if (folder.empty()) folder = drive.parent_path() / (drive.stem().string() + "-paper-" + letter);
@@ -44,7 +44,7 @@ void run(const std::string& letter, Experiment experiment, Options& options) {
 }
 
 CLI::App* add_experiment(CLI::App& paper, const std::string& letter, const std::string& what, Experiment experiment,
-                         const std::shared_ptr<Options>& options) {
+                         const std::shared_ptr<PaperOptions>& options) {
   CLI::App* command = paper.add_subcommand(letter, what);
   command->add_option("drive", options->drive.drive, "Drive log with REFERENCE")->required()->check(CLI::ExistingFile);
   add_config(*command, options->drive.vehicle);
@@ -52,11 +52,11 @@ CLI::App* add_experiment(CLI::App& paper, const std::string& letter, const std::
              "Folder for the page and the CSV files; DRIVE-paper-" + letter + " where not given")
       ->required(false);
   add_progress(*command, options->progress);
-  command->callback([=] { run(letter, experiment, *options); });
+  command->callback([=] { run_paper(letter, experiment, *options); });
   return command;
 }
 
-void add_turn_rate(CLI::App& command, Options& options, const std::string& what) {
+void add_turn_rate(CLI::App& command, PaperOptions& options, const std::string& what) {
   command.add_option("--turn-degps", options.turn_degps, what)->check(CLI::Range(0.0, 1000.0))->capture_default_str();
 }
 
@@ -65,9 +65,9 @@ void add_sigma(CLI::App& command, const std::string& name, double& value, const 
 }
 
 void add_paper_a(CLI::App& paper) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PaperOptions>();
   options->trajectory.front_ends = classic_front_ends();
-  const auto experiment = [](const Options& o) {
+  const auto experiment = [](const PaperOptions& o) {
     PaperARequest request = o.trajectory;
     request.drive = o.drive;
     return paper_a(request);
@@ -95,8 +95,10 @@ void add_paper_a(CLI::App& paper) {
 }
 
 void add_paper_b(CLI::App& paper) {
-  const auto options = std::make_shared<Options>();
-  const auto experiment = [](const Options& o) { return paper_b({o.drive, o.scheme, o.least_turn_deg * kDegree}); };
+  const auto options = std::make_shared<PaperOptions>();
+  const auto experiment = [](const PaperOptions& o) {
+    return paper_b({o.drive, o.scheme, o.least_turn_deg * kDegree});
+  };
   CLI::App* command = add_experiment(
       paper, "b", "Ock et al. (2020): vision alone, wheels, their scheme and the default without GNSS; figures 8 to 11",
       experiment, options);
@@ -116,8 +118,8 @@ void add_paper_b(CLI::App& paper) {
 }
 
 void add_paper_c(CLI::App& paper) {
-  const auto options = std::make_shared<Options>();
-  const auto experiment = [](const Options& o) { return paper_c(o.drive); };
+  const auto options = std::make_shared<PaperOptions>();
+  const auto experiment = [](const PaperOptions& o) { return paper_c(o.drive); };
   CLI::App* command = add_experiment(
       paper, "c", "Lee et al. (2025): tables 1 and 2, the fusion as printed, each part left out, and the default",
       experiment, options);

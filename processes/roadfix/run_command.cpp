@@ -16,14 +16,14 @@ namespace {
 
 volatile std::sig_atomic_t stop_asked = 0;
 
-struct Options {
+struct RunOptions {
   std::filesystem::path vehicle;
   std::string bus;
   int realtime = 0;
   bool print_config = false;
 };
 
-void run(const Options& options) {
+void run_processes(const RunOptions& options) {
   RunConfig config = load_config<RunConfig>(options.vehicle / "run.yaml");
   if (!options.bus.empty()) config.bus = options.bus;
   static_cast<void>(parse_bus_url(config.bus));  // here once, not from each process again and again
@@ -53,7 +53,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_run_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RunOptions>();
   CLI::App* command =
       app.add_subcommand("run", "Start a vehicle's processes, restart what dies, stop all in order on Ctrl-C");
   command->add_option("vehicle,--config", options->vehicle, "folder with run.yaml, for example configs/demo")
@@ -65,7 +65,7 @@ void add_run_command(CLI::App& app) {
                    "scheduling priority (SCHED_FIFO) of our programs that run.yaml gives none")
       ->check(CLI::Range(1, 99));
   command->add_flag("--print-config", options->print_config, "print the effective configuration and end");
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_processes(*options); });
 }
 
 }  // namespace roadfix

@@ -23,7 +23,7 @@
 namespace roadfix {
 namespace {
 
-struct Options {
+struct SimulateOptions {
   ScenarioRequest request;
   std::uint64_t seed = 1;
   OutputOption out;
@@ -60,7 +60,7 @@ std::function<void(std::size_t)> shown_on(ProgressLine& line, std::size_t exposu
   };
 }
 
-ScenarioConfig configured(const Options& options) {
+ScenarioConfig configured(const SimulateOptions& options) {
   ScenarioRequest request = options.request;
   if (request.scenario.empty()) throw std::runtime_error("which scenario? (--list shows all)");
   if (options.mono) request.camera = CameraLayout::kMono;
@@ -72,7 +72,7 @@ ScenarioConfig configured(const Options& options) {
   return config;
 }
 
-void run(const Options& options) {
+void run_simulate(const SimulateOptions& options) {
   if (options.list) return print_list();
   const ScenarioConfig config = configured(options);
   if (options.print_config) {
@@ -109,7 +109,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_simulate_command(CLI::App& app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SimulateOptions>();
   CLI::App* command = app.add_subcommand("simulate", "Make a drive log whose truth is known exactly");
   command->add_option("scenario", options->request.scenario, "name of a scenario, or a YAML file");
   command->add_option("--seed", options->seed, "of every random number")->capture_default_str();
@@ -132,7 +132,7 @@ void add_simulate_command(CLI::App& app) {
   command->add_flag("--print-config", options->print_config, "show the scenario's values as YAML");
   add_progress(*command, options->progress);
   command->add_flag("--timing", options->timing, "say how long it took");
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_simulate(*options); });
 }
 
 }  // namespace roadfix
