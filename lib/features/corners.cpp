@@ -71,7 +71,15 @@ float corner_score(const cv::Mat& gray, int u, int v) {
 
 constexpr double kSpacingFactor = 0.7;  ///< of the spacing of max_corners on a regular grid
 
+/// Side of the cells of a grid with one corner each.
+double cell_side_px(const cv::Size& size, double count) { return std::sqrt(static_cast<double>(size.area()) / count); }
+
 }  // namespace
+
+/// Sky and road have no corners, and corners with a minimum distance fill only half of the remaining area.
+double corner_distance_px(const cv::Size& size, int count, double min_distance_px) {
+  return std::min(min_distance_px, kSpacingFactor * cell_side_px(size, count));
+}
 
 std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> taken,
                                    const CornerConfig& config) {
@@ -79,11 +87,9 @@ std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::V
   const int border = std::max(config.border_px, kScoreMargin);
   std::vector<Corner> accepted;
   if (config.max_corners <= 0 || gray.cols <= 2 * border || gray.rows <= 2 * border) return accepted;
-  // Grid cells for about one corner each. In a small image the minimum distance is reduced: sky and road have no
-  // corners, and corners with a minimum distance fill only half of the remaining area.
-  const auto expected = static_cast<double>(taken.size()) + static_cast<double>(config.max_corners);
-  const double cell_px = std::sqrt(static_cast<double>(gray.total()) / expected);
-  const double distance_px = std::min(config.min_distance_px, kSpacingFactor * cell_px);
+  const int expected = static_cast<int>(taken.size()) + config.max_corners;
+  const double cell_px = cell_side_px(gray.size(), expected);
+  const double distance_px = corner_distance_px(gray.size(), expected, config.min_distance_px);
   Occupancy occupancy(gray, distance_px);
   for (const Eigen::Vector2f& pixel : taken) occupancy.add(pixel);
 

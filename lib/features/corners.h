@@ -21,6 +21,9 @@ struct CornerConfig {
   int border_px = 12;  ///< margin at the edge of the image
 };
 
+/// The least distance between `count` corners of an image of this size: `min_distance_px`, less in a small image.
+double corner_distance_px(const cv::Size& size, int count, double min_distance_px);
+
 /// The best corners away from `taken`. Each round selects one corner per grid cell, best first, so that a textured
 /// region cannot use up the quota. Ties: smaller row, then column.
 std::vector<Corner> spread_corners(const cv::Mat& gray, std::span<const Eigen::Vector2f> taken,

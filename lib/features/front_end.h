@@ -38,7 +38,7 @@ struct FrontEndConfig {
   int orb_levels = 6;                   ///< pyramid levels, each 1.2 times smaller
   double match_radius_px = 60.0;        ///< around the predicted position
   double match_ratio = 0.85;            ///< ratio test: best over second best distance, upper limit
-  double superpoint_min_score = 0.015;  ///< corner probability
+  double superpoint_min_score = 0.005;  ///< corner probability; published for large pictures: 0.015
   double xfeat_min_score = 0.05;        ///< as published
   double xfeat_scale = 1.0;
   double aliked_min_score = 0.2;  ///< as published

@@ -7,8 +7,7 @@
 
 #include "features/flow.h"
 #include "features/front_end.h"
-#include "features/patch.h"
-#include "features/perspective_bend.h"
+#include "features/patch_track.h"
 
 namespace roadfix {
 
@@ -29,22 +28,14 @@ class KltTracks final : public FrontEnd {
 
  private:
   struct Track {
-    Feature feature;  ///< position in the last image
-    Patch patch;
-    Eigen::Vector2f template_pixel = Eigen::Vector2f::Zero();  ///< of the feature, where the template is from
-    PatchAlignment alignment;                                  ///< of the patch in the last image
-    PatchModel<6> model{};                                     ///< of the template; recomputed after load()
+    int64_t number = 0;
+    PatchTrack place;  ///< in the last image
   };
-  [[nodiscard]] PatchConfig patch_config() const;
   /// Finds the track in the new image near `expected`; false where it is not found.
-  [[nodiscard]] bool locate(Track& track, const Eigen::Vector2f& expected, const FlowPyramid& pyramid) const;
-  /// Replaces the template by the patch in the last image; false where that is too close to the edge.
-  static bool update_template(Track& track, const cv::Mat& gray, int window_px);
+  [[nodiscard]] bool locate(PatchTrack& track, const Eigen::Vector2f& expected, const FlowPyramid& pyramid) const;
   /// Predicted position of each active track: the given prediction, else its last position.
   [[nodiscard]] std::vector<Eigen::Vector2f> predicted_pixels(std::span<const Feature> predictions) const;
   [[nodiscard]] std::vector<Feature> features() const;
-
-  [[nodiscard]] Eigen::Vector2f point(const Track& track) const;
 
   FrontEndConfig config_;
   std::optional<PerspectiveBend> perspective_;

@@ -7,7 +7,9 @@ namespace {
 
 class Sift final : public KeypointDetector {
  public:
-  explicit Sift(const FrontEndConfig& config) : sift_(cv::SIFT::create(kKeypointsPerTrack * config.max_features)) {}
+  explicit Sift(const FrontEndConfig& config)
+      : sift_(cv::SIFT::create(kKeypointsPerTrack * config.max_features, kLayers,
+                               kContrast)) {}
 
   Keypoints detect(const cv::Mat& gray) override {
     std::vector<cv::KeyPoint> keys;
@@ -32,6 +34,10 @@ class Sift final : public KeypointDetector {
 
  private:
   static constexpr int kKeypointsPerTrack = 4;
+  static constexpr int kLayers = 3;  ///< of an octave, as published
+  /// Of the grey levels' range, summed over an octave's layers; OpenCV's own is 0.04. Weak blobs fill the parts of the
+  /// picture that strong ones leave empty; the ratio test and the patch tell them apart.
+  static constexpr double kContrast = 0.01;
   cv::Ptr<cv::SIFT> sift_;
 };
 

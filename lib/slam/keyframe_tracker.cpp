@@ -23,33 +23,6 @@ constexpr double kVisualSpeedStd = 0.2;   ///< m/s, of a speed from two images
 /// The motion `T` scaled in time by `factor`.
 SE3 scaled_motion(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
 
-/// Pixel noise relative to optical flow: descriptor keypoints are localised on pyramid levels or network cells.
-double front_end_noise(const FrontEndConfig& front_end) {
-  switch (front_end.kind) {
-    case FrontEndKind::kOrb:
-      return 2.0;
-    case FrontEndKind::kSift:
-      return 1.25;
-    case FrontEndKind::kSuperPoint:
-      return 1.25 / front_end.superpoint_scale;
-    case FrontEndKind::kXFeat:  // SuperPoint's, whose corner map it has; not measured: the weights are the user's
-      return 1.25 / front_end.xfeat_scale;
-    case FrontEndKind::kAliked:
-      return 1.25 / front_end.aliked_scale;
-    case FrontEndKind::kKlt:
-      break;
-  }
-  return 1.0;
-}
-
-/// Adapts the pixel noise to the front end.
-KeyframeTrackerConfig with_front_end_noise(KeyframeTrackerConfig config) {
-  const double noise = front_end_noise(config.front_end);
-  config.sigma_px *= noise;
-  config.gate_px *= noise;
-  return config;
-}
-
 LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRig& rig) {
   // Corners at integer pixels, from another viewpoint.
   constexpr double kSigma_px = 1.0, kGate_px = 4.0;
@@ -67,7 +40,7 @@ LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRi
 KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const CameraRig& rig,
                                  std::unique_ptr<FrontEnd> front_end, Executor& executor,
                                  std::unique_ptr<RightImageMatcher> right_matcher)
-    : config_(with_front_end_noise(config)),
+    : config_(config),
       rig_(rig),
       left_(rig.left),
       front_end_(std::move(front_end)),

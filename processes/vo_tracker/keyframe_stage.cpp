@@ -106,7 +106,7 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   tracked_ = false;
   vo_status_t status = vo_status(frame, tracker_->scale_sensitivity_at(now_utime), config_.keyframe.front_end.kind);
   outputs.publish(kStatus, status);
-  vo_features2_t features = vo_features(frame, config_.keyframe.front_end.kind);
+  vo_features2_t features = vo_features(frame);
   outputs.publish(kFeatures, features);
 }
 

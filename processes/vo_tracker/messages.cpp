@@ -115,8 +115,8 @@ vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared,
   return m;
 }
 
-vo_features2_t vo_features(const TrackedFrame& frame, FrontEndKind front_end) {
-  const TrackNoise noise = track_noise(front_end);
+vo_features2_t vo_features(const TrackedFrame& frame) {
+  constexpr TrackNoise noise;
   vo_features2_t m{};
   for (const TrackedFeature& f : frame.features) {
     TrackSighting s{f.feature.track, f.feature.pixel.cast<double>(), {}, noise.sigma_px, noise.walk_px, 0.0};

@@ -19,7 +19,7 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
 const char* name_of(FrontEndKind kind);
 
 vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end);
-vo_features2_t vo_features(const TrackedFrame& frame, FrontEndKind front_end);
+vo_features2_t vo_features(const TrackedFrame& frame);
 
 void set_reset(int counter, const SE3& delta, pose_t& message);
 Restart restart(const vo_restart_t& message);

@@ -210,7 +210,7 @@ void MsckfStage::publish_frame(const MsckfOutput& out, Outputs& outputs) {
     status.time_offset_std_s = filter_->time_offset_std();
   }
   outputs.publish(kStatus, status);
-  const TrackNoise noise = track_noise(config_.msckf.front_end.kind);
+  constexpr TrackNoise noise;
   vo_features2_t features{};
   for (const PictureTracks::Seen& f : pictures_->seen()) {
     TrackSighting s{f.left.track, f.left.pixel.cast<double>(), {}, noise.sigma_px, noise.walk_px, 0.0};
