@@ -13,6 +13,9 @@ struct ImuBlock {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< m/s2, mean
   double gyro_spread = 0.0;                         ///< rad/s, largest distance of a quarter's mean from the block's
   double accel_spread = 0.0;                        ///< m/s2, likewise
+
+  /// No more than a hand or a rough engine: at rest only where something else says so too.
+  [[nodiscard]] bool quiet() const { return duration > 0.0 && gyro_spread < 0.03 && accel_spread < 0.36; }
 };
 
 class StandstillDetector {

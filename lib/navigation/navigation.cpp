@@ -260,8 +260,9 @@ void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) 
         [&](Filter& f) { return f.fuse(AidingSource::kNonholonomic, imu.t_us, road_level(f.state(), sigma), open); });
   }
   if (standing(all.leader(), block_done)) {
-    note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_velocity(f, false); }));
-    note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_rate(f, standstill_.block(), false); }));
+    note(all.aid([&](Filter& f) { return aiding_.zero_motion().use_velocity(f, false, standstill_.calm()); }));
+    note(all.aid(
+        [&](Filter& f) { return aiding_.zero_motion().use_rate(f, standstill_.block(), false, standstill_.calm()); }));
   }
   if (abandoned_ && usable()) count_reset(*abandoned_, all.leader().state().x);
   if (block_done && all.confirmed()) end_alignment();
@@ -342,8 +343,8 @@ void Navigation::step_aligned(const ImuSample& imu, bool block_done) {
     (void)filter.fuse(AidingSource::kNonholonomic, imu.t_us, road_level(filter.state(), car_.level_std()),
                       Gates::open().nis[2]);
   if (standing(filter, block_done)) {
-    note(aiding_.zero_motion().use_velocity(filter, true));
-    note(aiding_.zero_motion().use_rate(filter, standstill_.block(), true));
+    note(aiding_.zero_motion().use_velocity(filter, true, standstill_.calm()));
+    note(aiding_.zero_motion().use_rate(filter, standstill_.block(), true, standstill_.calm()));
   }
   if (camera_) use_pictures(imu.t_us);
 }
@@ -367,14 +368,21 @@ bool Navigation::standing(const Filter& filter, bool block_done) const {
   if (!block_done) return false;
   if (!config_.facts.has_imu)
     return config_.sources.zero_motion && car_.standing(filter.state().x.t_us, standstill_.block().duration);
-  return aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen());
+  return aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen(), picture_still(filter.state().x));
+}
+
+bool Navigation::picture_still(const Mean& x) const {
+  if (!camera_) return false;
+  const std::optional<CameraControl::Flow> flow = camera_->flow(x.t_us, x);
+  return flow && flow->still();
 }
 
 void Navigation::use_pictures(int64_t t_us) {
   Filter& filter = *filter_;
   camera_->skip_before(t_us - static_cast<int64_t>(1e6 * config_.process.max_gap), filter.state().x);
   while (camera_->next_us(filter.state().x).value_or(INT64_MAX) <= t_us) {
-    const bool standing = aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen());
+    const bool still = !standstill_.calm() && standstill_.block().quiet() && picture_still(filter.state().x);
+    const bool standing = aiding_.zero_motion().standing(filter, standstill_, imu_noise_.frozen(), still);
     const std::optional<AidingRecord> record = camera_->use(filter, standing);
     if (record) note(*record);
   }
@@ -464,7 +472,7 @@ std::optional<Memory> Navigation::memory() const {
   m.q_enu_imu = normalized_positive(Eigen::Quaterniond(enu.R_anchor_enu_at(m.place).transpose()) * s.x.nav.q_level_imu);
   m.place_sigma = std::sqrt(s.P()(kPos, kPos) + s.P()(kPos + 1, kPos + 1));
   m.heading_sigma = filter_->heading_std();
-  m.parked = aiding_.zero_motion().standing(*filter_, standstill_, imu_noise_.frozen()) &&
+  m.parked = aiding_.zero_motion().standing(*filter_, standstill_, imu_noise_.frozen(), false) &&
              m.heading_sigma < config_.start.confirm_std && m.place_sigma < kParkedSigma;
   return m;
 }

@@ -109,6 +109,7 @@ class Navigation {
   void forget_before(int64_t t_us);
   [[nodiscard]] inertial::ImuNoise noise_over(int64_t t_us, double dt) const;
   [[nodiscard]] bool standing(const Filter& filter, bool block_done) const;
+  [[nodiscard]] bool picture_still(const Mean& x) const;
   bool heads_backwards();
   [[nodiscard]] bool started_wrong() const;
   [[nodiscard]] bool usable() const;

@@ -13,16 +13,14 @@ constexpr double kForward = 4.0;          // m/s: faster, hardly a car is in rev
 constexpr double kRestSpeed = 0.02;       // m/s, of wheels that stand
 constexpr double kRestVelocity = 0.02;    // m/s, sigma of a start where wheels say that it stands
 constexpr double kUnseenVelocity = 0.05;  // m/s, where a still picture alone does
-// By which quarters of a block may differ where wheels or pictures say that it stands: an engine, or a hand.
-constexpr double kRestRateSpread = 0.01, kRestForceSpread = 0.12;  // rad/s, m/s2
-constexpr double kEarthRate = 7.3e-5;                              // rad/s: looks like bias
-constexpr int kCalmBlocks = 4;                                     // in a row, where neither says anything
-constexpr double kStandingAccel = 0.03;  // m/s2, by which the mean specific force may miss gravity while standing
-constexpr double kMovingAccel = 1.5;     // m/s2, along the way, likewise in motion: everyday driving
-constexpr double kLeastSpeed = 1.0;      // m/s: slower, a start waits for rest
-constexpr double kAside = 0.1;           // m/s, sigma of the velocity across the vehicle,
-constexpr double kAsideShare = 0.05;     // and what sideslip adds, as a share of the speed
-constexpr double kLocalYaw = 1e-4;       // rad: the heading at the start is a convention
+constexpr double kEarthRate = 7.3e-5;     // rad/s: looks like bias
+constexpr int kCalmBlocks = 4;            // in a row, where neither says anything
+constexpr double kStandingAccel = 0.03;   // m/s2, by which the mean specific force may miss gravity while standing
+constexpr double kMovingAccel = 1.5;      // m/s2, along the way, likewise in motion: everyday driving
+constexpr double kLeastSpeed = 1.0;       // m/s: slower, a start waits for rest
+constexpr double kAside = 0.1;            // m/s, sigma of the velocity across the vehicle,
+constexpr double kAsideShare = 0.05;      // and what sideslip adds, as a share of the speed
+constexpr double kLocalYaw = 1e-4;        // rad: the heading at the start is a convention
 
 StartState local_start(const LocalContext& c) {
   const inertial::ImuBlock& block = c.standstill.block();
@@ -47,8 +45,7 @@ bool LocalContext::sees_motion() const { return (wheel_speed || flow_px) && !see
 
 std::optional<StartState> start_at_rest(const LocalContext& c) {
   const inertial::ImuBlock& block = c.standstill.block();
-  const bool quiet = block.gyro_spread < kRestRateSpread && block.accel_spread < kRestForceSpread;
-  const bool rest = c.sees_rest() ? quiet : !c.sees_motion() && c.standstill.calm_blocks() >= kCalmBlocks;
+  const bool rest = c.sees_rest() ? block.quiet() : !c.sees_motion() && c.standstill.calm_blocks() >= kCalmBlocks;
   if (block.duration <= 0.0 || !rest) return std::nullopt;
   StartState s = local_start(c);
   s.standing = true;

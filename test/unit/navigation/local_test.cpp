@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "geometry/euler.h"
+#include "geometry/frames.h"
 #include "geometry/so3.h"
 #include "navigation/navigation.h"
 #include "simulation/scenarios.h"
@@ -46,6 +47,13 @@ NavigationConfig config_of(const TrackDrive& d, const Run& run) {
   return c;
 }
 
+TrackPicture picture_of(const TrackFrame& frame, bool two_eyes) {
+  TrackPicture p{frame.t_us, {}};
+  for (const TrackObservation& o : frame.tracks)
+    p.tracks.push_back({o.id, o.left, two_eyes ? o.right : std::nullopt, 0.1, 0.15, 0.2});
+  return p;
+}
+
 struct Outcome {
   double first_s = -1.0;              ///< after from_s
   double way_m = 0.0, error_m = 0.0;  ///< since the first valid pose; of the displacement since then, from its heading
@@ -66,12 +74,8 @@ Outcome run(const TrackDrive& d, const Run& r) {
     if (t_us < start || t_us > end) continue;
     if (const auto* fix = std::get_if<GnssFix>(&e)) filter.add(*fix);
     if (const auto* wheels = std::get_if<WheelSample>(&e)) filter.add(*wheels);
-    if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && r.pictures) {
-      TrackPicture p{frame->t_us, {}};
-      for (const TrackObservation& o : frame->tracks)
-        p.tracks.push_back({o.id, o.left, r.eyes == 2 ? o.right : std::nullopt, 0.1, 0.15, 0.2});
-      filter.add(p);
-    }
+    if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && r.pictures)
+      filter.add(picture_of(*frame, r.eyes == 2));
     const auto* imu = std::get_if<ImuSample>(&e);
     if (imu == nullptr) continue;
     ImuSample sample = *imu;
@@ -150,6 +154,58 @@ TEST_CASE("without GNSS a start in motion needs a speed") {
   const Outcome none = run(city(), {.from_s = 20.0, .until_s = 26.0, .wheels = false});
   CHECK(none.valid == 0);
   CHECK(none.waits_for == "rest, or a speed from the wheels");
+}
+
+namespace {
+
+enum class Pictures { kSeen, kHanging, kNone };
+
+/// Zero velocities that are used in 20 s of standing with an imu that an engine shakes more than a calm one.
+int rests_of_a_shaken_car(Pictures pictures) {
+  static const TrackDrive kStanding = [] {
+    ScenarioConfig s = scenario("standing");
+    s.duration_s = 20.0;
+    s.faults.clear();
+    return make_track_drive(s, 2, with_noise_of_pictures({}));
+  }();
+  NavigationConfig c = config_of(kStanding, {.eyes = 1, .wheels = false});
+  Navigation filter(c);
+  int used = 0;
+  std::optional<TrackPicture> first;
+  for (const DriveEvent& e : kStanding.events) {
+    if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && pictures != Pictures::kNone) {
+      TrackPicture picture = picture_of(*frame, false);
+      if (!first) first = picture;
+      if (pictures == Pictures::kHanging) picture.tracks = first->tracks;
+      filter.add(picture);
+    }
+    const auto* imu = std::get_if<ImuSample>(&e);
+    if (imu == nullptr) continue;
+    ImuSample shaken = *imu;
+    const double sway = imu->t_us / 250'000 % 2 == 0 ? 1.0 : -1.0;
+    shaken.gyro.x() += 0.008 * sway;
+    shaken.accel.y() += 0.08 * sway;
+    (void)filter.advance(shaken);
+    for (const AidingRecord& r : filter.records())
+      used += r.source == AidingSource::kZeroVelocity && r.status == AidingStatus::kAccepted ? 1 : 0;
+    filter.clear_records();
+  }
+  return used;
+}
+
+}  // namespace
+
+TEST_CASE("a still picture shows rest where the imu alone cannot") {
+  CHECK(rests_of_a_shaken_car(Pictures::kSeen) > 25);
+  CHECK(rests_of_a_shaken_car(Pictures::kNone) == 0);
+  CHECK(rests_of_a_shaken_car(Pictures::kHanging) == 0);
+}
+
+TEST_CASE("the constraint of a car is none of a rig whose mounting nobody knows") {
+  NavigationConfig c;
+  CHECK(NonholonomicControl(c).due(1, 1'000'000));
+  c.facts.mounting_std.setConstant(3.1);
+  CHECK_FALSE(NonholonomicControl(c).due(1, 1'000'000));
 }
 
 TEST_CASE("a calm road is taken for rest only where nothing contradicts") {

@@ -61,7 +61,7 @@ void CameraControl::restart() {
 }
 
 void CameraControl::skip_before(int64_t t_us, const Mean& x) {
-  while (next_us(x).value_or(INT64_MAX) < t_us) waiting_.pop_front();
+  while (next_us(x).value_or(INT64_MAX) < t_us) (void)pass_waiting();
 }
 
 void CameraControl::forget_poses(State& state) {
@@ -69,19 +69,35 @@ void CameraControl::forget_poses(State& state) {
   state.drop_clones();
 }
 
+const CameraControl::TimedPicture& CameraControl::pass_waiting() {
+  used_.push_back(std::move(waiting_.front()));
+  waiting_.pop_front();
+  while (used_.size() >= kMostWaiting || seconds_between(used_.front().t_us, used_.back().t_us) > kFlowAge + kFlowSpan)
+    used_.pop_front();
+  return used_.back();
+}
+
 std::optional<CameraControl::Flow> CameraControl::flow(int64_t t_us, const Mean& x) const {
   const int64_t until_us = t_us - micros(x.camera_offset);
-  const auto after =
-      std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.t_us > until_us; });
-  if (after == waiting_.begin() || seconds_between((after - 1)->t_us, until_us) > kFlowAge) return std::nullopt;
-  const auto now = after - 1;
-  auto before = now;
-  while (before != waiting_.begin() && seconds_between(before->t_us, now->t_us) < kFlowSpan) --before;
+  const TimedPicture *now = nullptr, *before = nullptr;
+  const auto each_newest_first = [&](const auto& seen) {
+    for (const auto* list : {&waiting_, &used_})
+      for (auto p = list->rbegin(); p != list->rend(); ++p)
+        if (p->t_us <= until_us) seen(*p);
+  };
+  double pictures = 0.0;  // from the older one to the newer
+  each_newest_first([&](const TimedPicture& p) {
+    if (now == nullptr) now = &p;
+    if (before != nullptr && seconds_between(before->t_us, now->t_us) >= kFlowSpan) return;
+    pictures += before == nullptr ? 0.0 : 1.0;
+    before = &p;
+  });
+  if (now == nullptr || seconds_between(now->t_us, until_us) > kFlowAge) return std::nullopt;
   if (seconds_between(before->t_us, now->t_us) < kLeastFlowSpan) return std::nullopt;
+  if (same_picture(before->picture, now->picture)) return std::nullopt;
   std::vector<double> moved;
   double variance = 0.0;
   auto old = before->picture.tracks.begin();
-  const auto pictures = static_cast<double>(now - before);
   for (const TrackSighting& s : now->picture.tracks) {
     while (old != before->picture.tracks.end() && old->track < s.track) ++old;
     if (old == before->picture.tracks.end() || old->track != s.track) continue;
@@ -103,10 +119,8 @@ bool CameraControl::makes_pose(const SeenPicture& picture, int64_t t_us, bool st
 
 std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
   const int64_t t_us = *next_us(filter.state().x);
-  const Waiting now = std::move(waiting_.front());
-  waiting_.pop_front();
-  const bool same = same_picture(last_, now.picture);
-  last_ = now.picture;
+  const bool same = !used_.empty() && same_picture(used_.back().picture, waiting_.front().picture);
+  const TimedPicture& now = pass_waiting();
   const SeenPicture seen = seen_picture(now.picture, left_, right_ ? &*right_ : nullptr);
   num_seen_ = static_cast<int>(seen.points.size());
   if (!makes_pose(seen, t_us, standing, same)) {

@@ -38,10 +38,11 @@ class CameraControl {
   /// The filter jumped: tracks are forgotten, and its poses.
   void forget_poses(State& state);
 
-  /// Median motion of the tracks over a quarter to half a second up to t_us (the imu's clock), before pictures are used, and what it
-  /// is at most while the camera stands, px, (N.6.16); nothing without pictures or tracks.
+  /// Median motion of the tracks over a quarter to half a second up to t_us (the imu's clock), and what it is at most while the
+  /// camera stands, px, (N.6.16); nothing without pictures or tracks, or where a camera hangs.
   struct Flow {
     double median_px = 0.0, still_px = 0.0;
+    [[nodiscard]] bool still() const { return median_px < still_px; }
   };
   [[nodiscard]] std::optional<Flow> flow(int64_t t_us, const Mean& x) const;
 
@@ -57,18 +58,18 @@ class CameraControl {
   void serialise(Archive& a) {
     stamps_.serialise(a);
     tracks_.serialise(a);
-    serialise_list(a, waiting_, static_cast<int64_t>(kMostWaiting), [&](Waiting& w) {
-      a(w.t_us, w.id);
-      serialise_picture(a, w.picture);
-    });
-    serialise_picture(a, last_);
+    for (std::deque<TimedPicture>* list : {&waiting_, &used_})
+      serialise_list(a, *list, static_cast<int64_t>(kMostWaiting), [&](TimedPicture& p) {
+        a(p.t_us, p.id);
+        serialise_picture(a, p.picture);
+      });
     a(next_pose_, pose_us_, fitness_, misfit_, trial_, num_seen_);
   }
 
  private:
   static constexpr size_t kMostWaiting = 64;  ///< pictures
 
-  struct Waiting {
+  struct TimedPicture {
     int64_t t_us = 0, id = 0;
     TrackPicture picture;
   };
@@ -79,6 +80,8 @@ class CameraControl {
     std::array<ViewSighting, kMaxViews> seen;
   };
 
+  /// Moves the first picture that waits to those that were used, of which the last half second stays.
+  const TimedPicture& pass_waiting();
   [[nodiscard]] bool makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const;
   void add_pose(Filter& filter, int64_t t_us);
   void choose_tracks(const State& state, bool full);
@@ -97,8 +100,7 @@ class CameraControl {
   TrackWindow window_;
   std::vector<ChosenTrack> chosen_;
   Update rows_;
-  std::deque<Waiting> waiting_;
-  TrackPicture last_;
+  std::deque<TimedPicture> waiting_, used_;
   int64_t next_pose_ = 1, pose_us_ = 0;
   CameraFitness fitness_ = CameraFitness::kOnTrial;
   double misfit_ = 0.0, trial_ = 0.0;  ///< fading mean of pictures' misfit, and s of trial that spoke for the camera

@@ -7,7 +7,9 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kLearnSpeed = 2.0;       // m/s
+constexpr double kMountingKnown =
+    0.5;                             // rad; known worse, it is no row along the state: a rig that is no part of a car
+constexpr double kLearnSpeed = 2.0;  // m/s
 constexpr int64_t kDueEarly_us = 20'000;  // so that an interval of whole wheel periods is not missed by jitter
 
 /// Tyres slip with the lateral acceleration, springs give with any horizontal one.
@@ -19,7 +21,7 @@ double acceleration_of(const Filter& filter, int axis) {
 }  // namespace
 
 bool NonholonomicControl::due(int axis, int64_t t_us) {
-  if (!config_.sources.nonholonomic) return false;
+  if (!config_.sources.nonholonomic || config_.facts.mounting_std.tail<2>().maxCoeff() > kMountingKnown) return false;
   int64_t& next = next_us_[static_cast<size_t>(axis - 1)];
   if (t_us < next) return false;
   next = t_us + static_cast<int64_t>(1e6 * interval(axis)) - kDueEarly_us;

@@ -1,5 +1,6 @@
 #include "navigation/aiding/zero_motion/zero_motion_control.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
@@ -8,18 +9,22 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kStandingSpeed = 0.3;  // m/s
-constexpr double kStandingRate = 4e-3;  // rad/s
-constexpr int kCalmBlocks = 6;          // in a row; of 5500 blocks of moving cars two at most were
-constexpr double kMayBeZero = 16.3;     // chi-square of a velocity that may be zero, three axes, 99.9 %
+constexpr double kStandingSpeed = 0.3;   // m/s
+constexpr double kStandingRate = 4e-3;   // rad/s
+constexpr int kCalmBlocks = 6;           // in a row; of 5500 blocks of moving cars two at most were
+constexpr double kStillVelocity = 0.05;  // m/s, sigma of a still picture: a pixel at 10 m through 500 px in 0.4 s
+constexpr double kMayBeZero = 16.3;      // chi-square of a velocity that may be zero, three axes, 99.9 %
 
 }  // namespace
 
-bool ZeroMotionControl::standing(const Filter& filter, const inertial::StandstillDetector& standstill,
-                                 bool frozen) const {
-  if (!config_.sources.zero_motion || !standstill.calm() || frozen) return false;
+bool ZeroMotionControl::standing(const Filter& filter, const inertial::StandstillDetector& standstill, bool frozen,
+                                 bool still) const {
+  if (!config_.sources.zero_motion || frozen) return false;
+  if (!standstill.calm() && !(still && standstill.block().quiet())) return false;
   const Mean& x = filter.state().x;
-  if ((standstill.block().gyro - x.gyro_bias).norm() > kStandingRate) return false;
+  // A mean of quarters that differ by more than an idling engine makes them is known by as much less.
+  const double rate = kStandingRate + (standstill.calm() ? 0.0 : 0.5 * standstill.block().gyro_spread);
+  if ((standstill.block().gyro - x.gyro_bias).norm() > rate) return false;
   if (x.nav.velocity.norm() < kStandingSpeed) return true;
   // A velocity that is hardly known carries little information; calm for long carries much.
   if (standstill.calm_blocks() < kCalmBlocks) return false;
@@ -27,14 +32,15 @@ bool ZeroMotionControl::standing(const Filter& filter, const inertial::Standstil
   return filter.judge(AidingSource::kZeroVelocity, x.t_us, zero, kMayBeZero).status == AidingStatus::kAccepted;
 }
 
-AidingRecord ZeroMotionControl::use_velocity(Filter& filter, bool gated) const {
-  return filter.fuse(AidingSource::kZeroVelocity, filter.state().x.t_us,
-                     zero_velocity(filter.state(), config_.aiding.zero_velocity_std),
+AidingRecord ZeroMotionControl::use_velocity(Filter& filter, bool gated, bool calm) const {
+  const double sigma = std::max(config_.aiding.zero_velocity_std, calm ? 0.0 : kStillVelocity);
+  return filter.fuse(AidingSource::kZeroVelocity, filter.state().x.t_us, zero_velocity(filter.state(), sigma),
                      (gated ? gates_ : Gates::open()).nis[3]);
 }
 
-AidingRecord ZeroMotionControl::use_rate(Filter& filter, const inertial::ImuBlock& block, bool gated) const {
-  const double sigma = std::hypot(config_.aiding.zero_rate_std, config_.facts.imu.gyro / std::sqrt(block.duration));
+AidingRecord ZeroMotionControl::use_rate(Filter& filter, const inertial::ImuBlock& block, bool gated, bool calm) const {
+  const double sigma = std::hypot(config_.aiding.zero_rate_std, config_.facts.imu.gyro / std::sqrt(block.duration),
+                                  calm ? 0.0 : 0.5 * block.gyro_spread);
   return filter.fuse(AidingSource::kZeroRate, filter.state().x.t_us,
                      zero_rate(filter.state(), block.gyro, filter.earth().rate(), sigma),
                      (gated ? gates_ : Gates::open()).nis[3]);

@@ -11,10 +11,13 @@ class ZeroMotionControl {
  public:
   explicit ZeroMotionControl(const NavigationConfig& config) : config_(config), gates_(config.aiding.gate_sigma) {}
 
-  /// At the end of a block: calm samples, and a velocity that is zero or may be.
-  [[nodiscard]] bool standing(const Filter& filter, const inertial::StandstillDetector& standstill, bool frozen) const;
-  AidingRecord use_velocity(Filter& filter, bool gated) const;
-  AidingRecord use_rate(Filter& filter, const inertial::ImuBlock& block, bool gated) const;
+  /// At the end of a block: calm samples, and a velocity that is zero or may be. `still`: the picture does not move; an engine
+  /// that shakes the imu does not hide rest then.
+  [[nodiscard]] bool standing(const Filter& filter, const inertial::StandstillDetector& standstill, bool frozen,
+                              bool still) const;
+  /// `calm`: the imu alone says so; else the picture, which leaves slow motion unseen.
+  AidingRecord use_velocity(Filter& filter, bool gated, bool calm) const;
+  AidingRecord use_rate(Filter& filter, const inertial::ImuBlock& block, bool gated, bool calm) const;
 
  private:
   NavigationConfig config_;
