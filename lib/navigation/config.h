@@ -15,7 +15,8 @@ namespace roadfix::navigation {
 
 /// Facts of the sensors and of how they sit. A wide sigma says that something is to be estimated; zero: it is exact.
 struct VehicleFacts {
-  bool has_imu = true;  ///< false: the car's own motion drives the state, see without_imu()
+  bool has_receiver = true;  ///< false: a start waits for no fix
+  bool has_imu = true;       ///< false: the car's own motion drives the state, see without_imu()
   inertial::ImuNoise imu{1.0e-4, 1.0e-3};
   double gyro_bias_std = 1.0e-3;  ///< rad/s, at turn-on
   double accel_bias_std = 0.05;   ///< m/s2, at turn-on

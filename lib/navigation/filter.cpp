@@ -367,6 +367,26 @@ void Filter::widen(const BaseVector& d) {
       (d.head<kWithoutCamera>() * d.head<kWithoutCamera>().transpose()).eval();
 }
 
+void Filter::tie_frame(const inertial::Earth& earth, double yaw, double yaw_std, const Eigen::Vector3d& local_place,
+                       const Eigen::Vector3d& place) {
+  constexpr double kOpenPlace = 100.0;  // m, until the fix that tells it is used
+  flush();
+  const Eigen::Quaterniond turn = exp_q({0.0, 0.0, yaw});
+  const Eigen::Vector3d gravity_before = earth_.gravity(state_.x.nav.position);
+  state_.change_frame(yaw, place - turn * local_place, yaw_std, kOpenPlace);
+  motion_.acceleration = turn * motion_.acceleration;
+  motion_.lag = VelocityLag();
+  earth_ = earth;
+  // Biases held what a local frame does not know of the Earth; how much of it is what their priors left.
+  const Eigen::Matrix3d to_imu = state_.x.R().transpose();
+  BaseVector unknown = BaseVector::Zero();
+  unknown.segment<3>(kGyroBias) = to_imu * earth_.rate();
+  widen(unknown);
+  unknown.setZero();
+  unknown.segment<3>(kAccelBias) = to_imu * (earth_.gravity(state_.x.nav.position) - gravity_before);
+  widen(unknown);
+}
+
 double Filter::longest_age(bool wheels) const {
   double longest = 0.0;
   const Mean& x = state_.x;

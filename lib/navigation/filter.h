@@ -72,6 +72,10 @@ class Filter {
   /// P += d d' over the base block.
   void widen(const BaseVector& d);
 
+  /// A local frame becomes that of `earth`, (N.7.11): turned by `yaw` about the vertical, so that local_place is `place` in it.
+  void tie_frame(const inertial::Earth& earth, double yaw, double yaw_std, const Eigen::Vector3d& local_place,
+                 const Eigen::Vector3d& place);
+
   /// Watches for steps from now on, (N.5.8).
   void watch_for_steps() { steps_.begin(state_, motion_); }
   [[nodiscard]] StepDetector& steps() { return steps_; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "geometry/frames.h"
 #include "geometry/so3.h"
@@ -27,6 +28,9 @@ constexpr double kMoving = 1.0;              // m/s
 constexpr double kReverseTime = 3.0;         // s of driving backwards, faster than a car goes in reverse
 constexpr double kAgreedWay = 30.0;          // m, with fixes, after which a start is taken for right
 constexpr double kWheelPeriodSlack = 0.005;  // s
+constexpr double kTieVelocity = 2.0;         // m/s, sigma: more, and a local way ties no frame
+constexpr double kFixInterval = 1.5;         // s for a first fix of a receiver that is there: they come once a second
+constexpr double kUnmoved = 0.5;             // m, m/s
 constexpr double kPredictorSpan = 1.0;       // s that one transition of the output covariance may cover
 
 bool plausible(const ImuSample& s) {
@@ -53,6 +57,8 @@ Navigation::Navigation(const NavigationConfig& config, bool has_imu)
       imu_noise_(config_.facts.imu),
       car_(config_),
       alignment_(config_),
+      tie_(config_),
+      local_(without_gnss()),
       lag_us_(lag_of(prior_age(config_.facts))) {
   if (has_imu && config.sources.camera && config.facts.camera) camera_.emplace(config.camera, *config.facts.camera);
   records_.reserve(1024);
@@ -73,7 +79,7 @@ void Navigation::change_motion(bool has_imu) {
 
 bool Navigation::goes_without_imu() {
   if (!config_.facts.has_imu) return true;
-  if (local() || last_step_us_ != 0 || !ring_.empty() || bad_imu_ != 0) return false;
+  if (without_gnss() || last_step_us_ != 0 || !ring_.empty() || bad_imu_ != 0) return false;
   change_motion(false);
   return true;
 }
@@ -133,13 +139,15 @@ void Navigation::take(const GnssFix& fix, int64_t id) {
   const bool again = fix.t_us == last_fix_us_ && fix.antenna.latitude == last_fix_.latitude &&
                      fix.antenna.longitude == last_fix_.longitude && fix.antenna.height == last_fix_.height;
   const AidingStatus screened = again ? AidingStatus::kBadInput : screen_.check(fix);
-  if (local()) return note(record_of(AidingSource::kGnssPosition, AidingStatus::kDisabled, fix.t_us, id));
+  if (without_gnss()) return note(record_of(AidingSource::kGnssPosition, AidingStatus::kDisabled, fix.t_us, id));
   if (screened != AidingStatus::kAccepted) return note(record_of(AidingSource::kGnssPosition, screened, fix.t_us, id));
-  if (!anchor_) anchor_ = fix.antenna;
+  if (local_ && gives_way_to_fixes(fix.t_us)) align_again();
+  std::optional<Geodetic>& anchor = local_ ? tie_anchor_ : anchor_;
+  if (!anchor) anchor = fix.antenna;
   last_fix_us_ = fix.t_us;
   last_fix_ = fix.antenna;
   alignment_.add(fix);
-  const QueuedFix all = queued(fix, id, EnuAnchor(*anchor_), config_);
+  const QueuedFix all = queued(fix, id, EnuAnchor(*anchor), config_);
   for (const std::optional<Queued>& q : {all.position, all.velocity, all.heading})
     if (q) queue_.push(*q);
 }
@@ -155,7 +163,7 @@ void Navigation::take(const WheelSample& wheels, int64_t id) {
 }
 
 void Navigation::add(const MagSample& mag, int64_t id) {
-  if (!config_.sources.magnetic_heading || local()) return;
+  if (!config_.sources.magnetic_heading || local_) return;
   if (seconds_between(last_magnetic_us_, mag.t_us) < config_.aiding.magnetic_interval) return;
   const std::optional<Queued> q = queued(mag, id, config_);
   if (!q) return;
@@ -208,9 +216,10 @@ void Navigation::step(const ImuSample& imu) {
     // What was measured inside the gap is of a time that the state skips.
     forget_before(imu.t_us - static_cast<int64_t>(1e6 * config_.process.max_gap));
     aiding_.gnss_position().clear_run();
+    tie_.restart();
   }
   // While moving: a turn that nobody saw and that fits into none of the start's hypotheses.
-  const bool turned = kBridgeRate * dt > 2.0 * config_.start.heading_std && !local() && moved_meanwhile(dt);
+  const bool turned = kBridgeRate * dt > 2.0 * config_.start.heading_std && !local_ && moved_meanwhile(dt);
   if (dt > kRealignGap || (turned && phase_ == Phase::kHeading)) align_again();
   if (phase_ == Phase::kDone) {
     filter_->predict(imu, dt, noise_over(imu.t_us, dt));
@@ -220,7 +229,7 @@ void Navigation::step(const ImuSample& imu) {
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == Phase::kHeading) {
     step_heading(imu, dt, block_done);
-  } else if (local()) {
+  } else if (without_gnss()) {
     if (block_done && !imu_noise_.frozen()) try_local_start(imu.t_us);
   } else {
     phase_ = alignment_.has_fix() ? Phase::kLevelling : Phase::kWaiting;
@@ -230,7 +239,10 @@ void Navigation::step(const ImuSample& imu) {
       bias = aiding_.gnss_position().lasting_std(*alignment_.fix());
       back = aiding_.gnss_position().return_std(*alignment_.fix());
     }
-    if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias, back)) return;
+    if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias, back)) {
+      if (may_start_locally(imu.t_us)) try_local_start(imu.t_us);
+      return;
+    }
     if (!alignment_.parked()) aiding_.gnss_position().started_with(*alignment_.fix());
     // What is older made the start, or lies too far back to be carried over an unknown acceleration.
     forget_before(imu.t_us + 1);
@@ -273,9 +285,47 @@ void Navigation::try_local_start(int64_t t_us) {
       local_start_.attempt(config_, t_us, standstill_, camera_ ? &*camera_ : nullptr);
   if (!start) return;
   forget_before(t_us + 1);
+  local_ = true;
+  tie_.restart();
+  // What it starts by aids it.
+  used_at_us_[static_cast<size_t>(start->standing ? AidingSource::kZeroVelocity : AidingSource::kWheelSpeed)] = t_us;
   alignment_.hypotheses().start(inertial::Earth(), *start);
   predictor_.emplace(inertial::Earth());
   end_alignment();
+}
+
+/// Where no fix has ever come: one that has was of a place in enu, which a local frame would forget. A car that is at rest may
+/// drive off any moment, and what rest tells is lost then.
+bool Navigation::may_start_locally(int64_t t_us) const {
+  if (!config_.facts.has_imu || anchor_) return false;
+  const double wait = alignment_.remembers_heading() ? kNoFixWait : kFixInterval;
+  return !config_.facts.has_receiver || alignment_.waited(t_us) >= wait;
+}
+
+/// Fixes that come with the start begin anew, as long as the car has not moved: they tell more than a convention.
+bool Navigation::gives_way_to_fixes(int64_t t_us) const {
+  if (phase_ != Phase::kDone || velocity_std(filter_->state()) > kTieVelocity) return true;
+  const inertial::Strapdown& now = filter_->state().x.nav;
+  return alignment_.waited(t_us) < kNoFixWait && now.position.norm() < kUnmoved && now.velocity.norm() < kUnmoved;
+}
+
+bool Navigation::tie_frame(const Queued& q) {
+  const std::optional<FrameTie::Turn> turn = tie_.add(q, *filter_);
+  if (!turn) return false;
+  const Mean& x = filter_->state().x;
+  const SE3 before{x.nav.q_level_imu, x.nav.position};
+  const Eigen::Vector3d antenna = x.nav.position + x.nav.q_level_imu * x.p_imu_antenna + q.ahead(x) * x.nav.velocity;
+  anchor_ = std::exchange(tie_anchor_, std::nullopt);
+  local_ = false;
+  filter_->tie_frame(earth_of(config_, anchor_), turn->value, turn->std, antenna, q.value);
+  if (config_.aiding.step_detection) filter_->watch_for_steps();
+  predictor_.emplace(filter_->earth());
+  predictor_stale_ = true;
+  start_agreed_ = false;
+  started_at_ = x.nav.position;
+  backwards_since_us_ = last_step_us_;
+  count_reset(before, x);
+  return true;
 }
 
 void Navigation::end_alignment() {
@@ -301,6 +351,10 @@ void Navigation::end_alignment() {
 
 void Navigation::align_again() {
   if (usable()) abandoned_ = SE3{filter()->state().x.nav.q_level_imu, filter()->state().x.nav.position};
+  if (local_ && !without_gnss()) {
+    local_ = false;
+    if (tie_anchor_) anchor_ = std::exchange(tie_anchor_, std::nullopt);
+  }
   phase_ = Phase::kWaiting;
   filter_.reset();
   if (camera_) camera_->restart();
@@ -355,8 +409,7 @@ bool Navigation::heads_backwards() {
   const Eigen::Vector3d forward = x.nav.q_level_imu * (vehicle::R_imu_vehicle(x.mounting) * Eigen::Vector3d::UnitX());
   const bool wheels =
       seconds_between(used_at_us_[static_cast<size_t>(AidingSource::kWheelSpeed)], x.t_us) < kWheelsSilent;
-  if (local() || wheels || forward.dot(x.nav.velocity) > -HeadingHypotheses::kReverseSpeed)
-    backwards_since_us_ = x.t_us;
+  if (local_ || wheels || forward.dot(x.nav.velocity) > -HeadingHypotheses::kReverseSpeed) backwards_since_us_ = x.t_us;
   return seconds_between(backwards_since_us_, x.t_us) > kReverseTime;
 }
 
@@ -402,6 +455,10 @@ void Navigation::mend_steps() {
 }
 
 void Navigation::use(const Queued& q) {
+  const bool of_receiver =
+      q.kind == Queued::Kind::kPosition || q.kind == Queued::Kind::kVelocity || q.kind == Queued::Kind::kHeading;
+  if (local_ && of_receiver && !tie_frame(q))
+    return note(record_of(Aiding::source_of(q.kind), AidingStatus::kNotReady, q.t_us), q.id);
   const SE3 before{filter_->state().x.nav.q_level_imu, filter_->state().x.nav.position};
   const AidingRecord r = aiding_.use(*filter_, q);
   note(r, q.id);
@@ -481,6 +538,8 @@ template <class Archive>
 void Navigation::serialise(Archive& a) {
   serialise_optional(
       a, anchor_, [] { return Geodetic(); }, [&](Geodetic& g) { a(g.latitude, g.longitude, g.height); });
+  serialise_optional(
+      a, tie_anchor_, [] { return Geodetic(); }, [&](Geodetic& g) { a(g.latitude, g.longitude, g.height); });
   const inertial::Earth earth = earth_of(config_, anchor_);
   serialise_optional(
       a, filter_, [&] { return Filter(config_, earth, camera_.has_value()); }, [&](Filter& f) { f.serialise(a); });
@@ -495,12 +554,13 @@ void Navigation::serialise(Archive& a) {
   car_.serialise(a);
   ring_.serialise(a);
   local_start_.serialise(a);
+  tie_.serialise(a);
   queue_.serialise(a);
   serialise_optional(
       a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
   a(phase_, predictor_stale_, lag_us_, last_step_us_, last_wheel_us_, wheels_at_us_, last_magnetic_us_, last_fix_us_,
     last_fix_.latitude, last_fix_.longitude, last_fix_.height, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
-    bad_imu_, gaps_, steps_, backwards_since_us_, start_agreed_, started_at_);
+    bad_imu_, gaps_, steps_, backwards_since_us_, start_agreed_, started_at_, local_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

@@ -1,7 +1,8 @@
 /// The navigation filter: one error state and one covariance for GNSS, imu, wheels and camera. Derivation:
 /// lib/navigation/MODEL.md.
 ///
-/// Frames: level is enu at the first good fix (or at the remembered place); imu axes x forward, y left, z up; vehicle
+/// Frames: level is enu at the first good fix (or at the remembered place), or local where no fix has come: it becomes enu,
+/// with a reset, when fixes tell how it lies in it. imu axes x forward, y left, z up; vehicle
 /// axes differ from the imu's by the mounting angles.
 /// Time: inputs come in the order of their stamps as the caller's horizon passes them (advance, add); see() hands in
 /// the newest imu sample ahead of the horizon, and output() is for that one. The state stays behind the horizon by the
@@ -22,6 +23,7 @@
 #include "navigation/aiding/camera/camera_control.h"
 #include "navigation/aiding/gnss_screen.h"
 #include "navigation/initialisation/alignment.h"
+#include "navigation/initialisation/frame_tie.h"
 #include "navigation/initialisation/local_start.h"
 #include "navigation/motion/car_motion.h"
 #include "navigation/output_predictor.h"
@@ -46,7 +48,7 @@ struct NavigationStatus {
 
 struct NavigationOutput {
   Phase phase = Phase::kWaiting;
-  bool local = false;  ///< the level frame is where it started; else enu
+  bool local = false;  ///< the level frame is where it started, until fixes tie it; else enu
   Odometry odometry;   ///< imu origin and axes in the level frame
   std::string reason;  ///< plain words, empty when all is well
   int reset_counter = 0;
@@ -67,7 +69,7 @@ class Navigation {
   void add(const MagSample& mag, int64_t id = 0);
   void add(const TrackPicture& picture, int64_t id = 0);
 
-  /// Nothing before the first fix.
+  /// Nothing before the first fix, and in a local frame.
   [[nodiscard]] std::optional<Geodetic> anchor() const { return anchor_; }
   /// What an earlier drive left, before the first start of this one; later it changes nothing.
   void recall(const Memory& memory);
@@ -104,6 +106,10 @@ class Navigation {
   void align_again();
   void ask_heading();
   void try_local_start(int64_t t_us);
+  [[nodiscard]] bool may_start_locally(int64_t t_us) const;
+  [[nodiscard]] bool gives_way_to_fixes(int64_t t_us) const;
+  /// A measurement of a receiver in a local frame; true: the frame is enu now, and it can be used.
+  bool tie_frame(const Queued& q);
   void end_alignment();
   void note(AidingRecord record, int64_t id = 0);
   void forget_before(int64_t t_us);
@@ -113,8 +119,8 @@ class Navigation {
   bool heads_backwards();
   [[nodiscard]] bool started_wrong() const;
   [[nodiscard]] bool usable() const;
-  /// No GNSS is to be used: the frame is local.
-  [[nodiscard]] bool local() const {
+  /// No GNSS is to be used: the frame stays local.
+  [[nodiscard]] bool without_gnss() const {
     const SourceList& s = config_.sources;
     return !s.gnss_position && !s.gnss_velocity && !s.gnss_heading;
   }
@@ -137,7 +143,10 @@ class Navigation {
   MeasurementQueue queue_;
   Alignment alignment_;
   LocalStart local_start_;
+  FrameTie tie_;
   std::optional<Geodetic> anchor_;
+  std::optional<Geodetic> tie_anchor_;  ///< of the fixes that come in a local frame
+  bool local_ = false;                  ///< the level frame is local
   std::optional<Filter> filter_;
   std::optional<CameraControl> camera_;  ///< where there is one that is to be used
   std::optional<OutputPredictor> predictor_;

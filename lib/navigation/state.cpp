@@ -194,6 +194,38 @@ void State::move_reference(const Eigen::Vector3d& p) {
   mirror();
 }
 
+void State::change_frame(double yaw, const Eigen::Vector3d& p, double yaw_std, double place_std) {
+  const Eigen::Quaterniond q = exp_q({0.0, 0.0, yaw});
+  const Eigen::Matrix3d R = q.toRotationMatrix();
+  x.nav.q_level_imu = (q * x.nav.q_level_imu).normalized();
+  x.nav.velocity = R * x.nav.velocity;
+  x.nav.position = R * x.nav.position + p;
+  for (Eigen::Vector3d* level : {&x.gnss_bias, &x.gnss_velocity_bias, &x.gnss_return}) *level = R * *level;
+  p_ref = R * p_ref + p;
+  const auto turn = [&](int at) {
+    P_.block(at, 0, 3, size_) = R * P_.block(at, 0, 3, size_).eval();
+    P_.block(0, at, size_, 3) = P_.block(0, at, size_, 3).eval() * R.transpose();
+    carried_.middleRows<3>(at) = (R * carried_.middleRows<3>(at)).eval();
+  };
+  for (const int at : {kAtt, kVel, kPos, kGnssBias, kGnssVelocityBias, kGnssReturn}) turn(at);
+  std::vector<int> poses = {kAtt};
+  for (Clone& c : clones) {
+    c.R = Eigen::Quaterniond(R * c.R).normalized().toRotationMatrix();
+    c.p = R * c.p + p;
+    turn(c.at);
+    turn(c.at + 3);
+    poses.push_back(c.at);
+  }
+  static_assert(kPos == kAtt + 6);
+  const auto place_of = [](int pose) { return pose == kAtt ? kPos : pose + 3; };
+  for (const int i : poses)
+    for (const int k : poses) {
+      P_(i + 2, k + 2) += yaw_std * yaw_std;
+      P_.block<3, 3>(place_of(i), place_of(k)).diagonal().array() += place_std * place_std;
+    }
+  mirror();
+}
+
 int State::grow(int width) {
   const int at = size_;
   size_ += width;

@@ -160,6 +160,10 @@ class State {
   /// Expresses all errors about p, (N.1.5).
   void move_reference(const Eigen::Vector3d& p);
 
+  /// The level frame becomes another one: turned by `yaw` about its vertical through its origin, then moved by `p`; about the
+  /// turn and the place everything in it shares an error of these standard deviations, (N.7.11).
+  void change_frame(double yaw, const Eigen::Vector3d& p, double yaw_std, double place_std);
+
   /// Room for a block of `width` at the end, its rows and columns zero; its first index.
   int grow(int width);
   void remove_clone(int64_t id);

@@ -9,6 +9,7 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr char kHeadingRoughly[] = "the heading is known roughly";
+constexpr char kNotTied[] = "a local frame, until fixes tie it";
 constexpr char kDisplaced[] = "GNSS positions contradict all else and are taken for displaced";
 constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is taken for an error of the receiver";
 
@@ -35,11 +36,11 @@ const char* waiting_for(Phase phase, bool has_imu, bool has_fix) {
 NavigationOutput Navigation::output() {
   NavigationOutput out;
   out.phase = phase_;
-  out.local = local();
+  out.local = local_;
   out.reset_counter = reset_counter_;
   out.reset_delta = reset_delta_;
   out.odometry.t_us = ring_.empty() ? last_step_us_ : ring_.back().t_us;
-  const char* waits = local() ? kWaitsForRest : waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
+  const char* waits = without_gnss() ? kWaitsForRest : waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
   if (filter() == nullptr) {
     out.reason = std::string("waits for ") + waits;
     return out;
@@ -49,15 +50,16 @@ NavigationOutput Navigation::output() {
   const double horizontal = std::sqrt(out.odometry.cov_pose(0, 0) + out.odometry.cov_pose(1, 1));
   if (!usable()) {
     out.reason = std::string("waits for ") + waits;
-  } else if (local() && out.odometry.cov_velocity.diagonal().maxCoeff() > kInvalidVelocity * kInvalidVelocity) {
+  } else if (local_ && out.odometry.cov_velocity.diagonal().maxCoeff() > kInvalidVelocity * kInvalidVelocity) {
     out.reason = "velocity not known well enough";
-  } else if (!(horizontal < config_.start.invalid_sigma_m) && !local()) {
+  } else if (!(horizontal < config_.start.invalid_sigma_m) && !local_) {
     out.reason = "position too uncertain";
   } else {
     const bool coasting = coasting_since().has_value();
     if (phase_ == Phase::kHeading) out.reason = kHeadingRoughly;
     out.odometry.validity = coasting || alignment_.parked() ? Validity::kCoasting : Validity::kValid;
-    if (coasting) out.reason = local() ? "coasting without wheels and tracks" : "coasting without GNSS";
+    if (local_ && !without_gnss()) out.reason = kNotTied;
+    if (coasting) out.reason = local_ ? "coasting without wheels and tracks" : "coasting without GNSS";
     if (alignment_.parked()) out.reason = "from the place where it was parked, without GNSS yet";
     if (aiding_.gnss_position().height_displaced()) out.reason = kHeightContradicts;
     if (aiding_.gnss_position().displaced()) out.reason = kDisplaced;
@@ -74,8 +76,7 @@ double Navigation::coasting_time() const {
 std::optional<int64_t> Navigation::coasting_since() const {
   const auto used_at = [&](AidingSource source) { return used_at_us_[static_cast<size_t>(source)]; };
   int64_t anchored = std::max(used_at(AidingSource::kGnssPosition), used_at(AidingSource::kZeroVelocity));
-  if (local())
-    anchored = std::max({anchored, used_at(AidingSource::kWheelSpeed), used_at(AidingSource::kCameraTracks)});
+  if (local_) anchored = std::max({anchored, used_at(AidingSource::kWheelSpeed), used_at(AidingSource::kCameraTracks)});
   const bool coasting = usable() && seconds_between(anchored, last_step_us_) > coasting_time();
   return coasting ? std::optional(anchored) : std::nullopt;
 }
@@ -84,7 +85,7 @@ NavigationStatus Navigation::status() const {
   NavigationStatus s;
   s.phase = phase_;
   s.waits_for = waiting_for(phase_, last_step_us_ != 0, alignment_.has_fix());
-  if (local() && phase_ != Phase::kDone) s.waits_for = kWaitsForRest;
+  if (without_gnss() && phase_ != Phase::kDone) s.waits_for = kWaitsForRest;
   s.gnss_quality = screen_.quality();
   s.gnss_reason = screen_.reason();
   if (s.gnss_reason.empty() && aiding_.gnss_position().height_displaced()) s.gnss_reason = kHeightContradicts;

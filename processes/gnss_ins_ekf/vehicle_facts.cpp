@@ -45,6 +45,7 @@ std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibrati
 navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
   navigation::VehicleFacts v;
   v.camera = camera_facts(calibration);
+  v.has_receiver = calibration.sensors.gnss.has_value();
   v.position_latency_std = v.velocity_latency_std = kUnknownLatency;
   if (const auto& imu = calibration.sensors.imu) {
     take_known(imu->gyro_noise, v.imu.gyro);

@@ -17,6 +17,8 @@ class Alignment {
   void see_first_sample(int64_t t_us) {
     if (first_us_ == 0) first_us_ = t_us;
   }
+  /// s since the first sample.
+  [[nodiscard]] double waited(int64_t t_us) const { return seconds_between(first_us_, t_us); }
   /// A fix that passed the screen, for the start.
   void add(const GnssFix& fix);
   /// At the end of a block; true: it has started, and everything stamped before begun_us() is used.

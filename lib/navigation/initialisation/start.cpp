@@ -18,7 +18,6 @@ constexpr double kStandingSpeed = 0.3;  // m/s
 constexpr double kParkedSlack = 3.0;    // m, by which fixes may miss the place beyond their sigma (another bay is 2.5)
 constexpr double kParkedPlace = 0.5;    // m, by which a parked car may have been rolled
 constexpr double kParkedTilt = 0.02;    // rad; more, and it stands elsewhere
-constexpr double kNoFixWait = 5.0;      // s for a first fix, before a start without
 constexpr double kCarAcceleration = 2.0;    // m/s2, by which a mean velocity may differ from the present one
 constexpr double kStandingAccel = 0.03;     // m/s2, by which the mean specific force may miss gravity while standing
 constexpr double kMovingAccel = 1.5;        // m/s2, likewise in motion

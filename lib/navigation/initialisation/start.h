@@ -45,6 +45,9 @@ struct StartContext {
   double waited = 0.0;  ///< s since the first imu sample
 };
 
+/// s for a first fix, before a start without.
+inline constexpr double kNoFixWait = 5.0;
+
 class StartStrategy {
  public:
   virtual ~StartStrategy() = default;

@@ -1,6 +1,7 @@
 // The navigation filter without GNSS: its frame begins where it starts, at rest or with a speed from the wheels.
 #include <catch2/catch.hpp>
 #include <cstdio>
+#include <functional>
 
 #include "geometry/euler.h"
 #include "geometry/frames.h"
@@ -154,6 +155,97 @@ TEST_CASE("without GNSS a start in motion needs a speed") {
   const Outcome none = run(city(), {.from_s = 20.0, .until_s = 26.0, .wheels = false});
   CHECK(none.valid == 0);
   CHECK(none.waits_for == "rest, or a speed from the wheels");
+}
+
+namespace {
+
+struct Tied {
+  double first_s = -1.0, tied_s = -1.0;           ///< after the first sample: any valid pose, the first in enu
+  double jump_mps = 0.0;                          ///< of the velocity in imu axes, at the tie
+  double end_m = 0.0;                             ///< m, horizontal error at the end
+  double heading_off = 0.0;                       ///< of the first pose in enu, in sigmas
+  int invalid_after = 0, scored = 0, inside = 0;  ///< horizontal axes in enu within three sigmas
+};
+
+/// City drive from rest; fixes come from `fixes_s` on, with spoil(fix, s since then).
+Tied tied(double fixes_s, int eyes, const std::function<void(GnssFix&, double)>& spoil = {}) {
+  const TrackDrive& d = city();
+  NavigationConfig c = config_of(d, {.eyes = eyes, .wheels = false});
+  c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = true;
+  c.facts.has_receiver = false;  // of its calibration: fixes may come all the same
+  c.facts.p_imu_antenna = d.drive.config.gnss.lever_arm_m - d.drive.config.imu.position_m;
+  Navigation filter(c);
+  const int64_t start = d.drive.imu.front().t_us;
+  Tied out;
+  std::optional<Eigen::Vector3d> velocity;
+  bool local = true;
+  for (const DriveEvent& e : d.events) {
+    const int64_t t_us = stamp_of(e);
+    const double t = seconds_between(start, t_us);
+    if (const auto* given = std::get_if<GnssFix>(&e); given != nullptr && t >= fixes_s) {
+      GnssFix fix = *given;
+      if (spoil) spoil(fix, t - fixes_s);
+      filter.add(fix);
+    }
+    if (const auto* frame = std::get_if<TrackFrame>(&e)) filter.add(picture_of(*frame, eyes == 2));
+    const auto* imu = std::get_if<ImuSample>(&e);
+    if (imu == nullptr) continue;
+    (void)filter.advance(*imu);
+    filter.clear_records();
+    const NavigationOutput o = filter.output();
+    if (o.odometry.validity == Validity::kInvalid) {
+      out.invalid_after += out.first_s >= 0.0 ? 1 : 0;
+      continue;
+    }
+    if (out.first_s < 0.0) out.first_s = t;
+    if (o.local) CHECK_FALSE(filter.anchor());
+    const bool tied_now = local && !o.local;
+    if (tied_now && velocity) out.jump_mps = (o.odometry.velocity - *velocity).norm();
+    velocity = o.odometry.velocity;
+    local = o.local;
+    if (o.local) continue;
+    const Odometry truth = d.drive.truth_at(t_us);
+    const EnuAnchor enu(*filter.anchor());
+    const Eigen::Vector3d place =
+        enu.enu(d.drive.anchor.geodetic(truth.T_frame_vehicle * d.drive.config.imu.position_m));
+    const Eigen::Quaterniond q = truth.T_frame_vehicle.q * d.drive.errors.q_vehicle_imu;
+    if (tied_now) {
+      out.tied_s = t;
+      const double off = wrap_angle(yaw_of(o.odometry.T_frame_vehicle.q) - yaw_of(q));
+      out.heading_off = std::abs(off) / std::sqrt(o.odometry.cov_pose(5, 5));
+    }
+    const Eigen::Vector3d error = o.odometry.T_frame_vehicle.p - place;
+    out.end_m = error.head<2>().norm();
+    for (int i = 0; i < 2; ++i) out.inside += error(i) * error(i) < 9.0 * o.odometry.cov_pose(i, i) ? 1 : 0;
+    out.scored += 2;
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a local frame becomes enu when fixes come, without losing a pose") {
+  for (const int eyes : {1, 2}) {
+    const Tied t = tied(20.0, eyes);
+    std::printf("eyes %d: first %.2f s, enu %.2f s, velocity %.3f m/s, heading %.1f sigma, end %.3f m, inside %.3f\n",
+                eyes, t.first_s, t.tied_s, t.jump_mps, t.heading_off, t.end_m,
+                static_cast<double>(t.inside) / t.scored);
+    CHECK(t.first_s < 2.5);
+    CHECK(t.tied_s > 20.0);
+    CHECK(t.tied_s < 23.0);
+    CHECK(t.invalid_after == 0);
+    CHECK(t.jump_mps < 0.3);
+    CHECK(t.heading_off < 4.0);
+    CHECK(t.end_m < 0.2);
+    CHECK(t.inside > 0.97 * t.scored);
+  }
+  // Fixes of another way tie nothing.
+  const auto stretched = [](GnssFix& fix, double) {
+    fix.antenna.latitude += 0.5 * (fix.antenna.latitude - city().drive.gnss.front().antenna.latitude);
+    fix.antenna.longitude += 0.5 * (fix.antenna.longitude - city().drive.gnss.front().antenna.longitude);
+    fix.velocity->enu *= 1.5;
+  };
+  CHECK(tied(20.0, 2, stretched).tied_s < 0.0);
 }
 
 namespace {

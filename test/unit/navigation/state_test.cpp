@@ -117,3 +117,46 @@ TEST_CASE("a snapshot restores the state to the bit, and a wrong size is refused
   StateArchiveIn again{StateReader(bytes)};
   CHECK_THROWS(small.serialise(again));
 }
+
+TEST_CASE("another level frame has the same errors, turned, and one more that all poses share") {
+  test::RandomNavigationState random(9);
+  State before = random_state(random, 3);
+  before.carry(1);
+  const double yaw = 2.1;
+  const Eigen::Vector3d p(500.0, -200.0, 30.0);
+  Eigen::VectorXd d(before.size());
+  for (int i = 0; i < d.size(); ++i) d(i) = random.number(0.1);
+  before.carried().col(0).head(d.size()) = d;
+  State turned = before;
+  turned.change_frame(yaw, p, 0.0, 0.0);
+  // An error and the change of frame, in either order.
+  State first = before, then = turned;
+  first.retract(d);
+  first.change_frame(yaw, p, 0.0, 0.0);
+  then.retract(Eigen::VectorXd(turned.carried().col(0).head(d.size())));
+  CHECK(local(first.x, then.x, turned.p_ref).norm() < 1e-9);
+  for (size_t i = 0; i < first.clones.size(); ++i) {
+    CHECK((first.clones[i].p - then.clones[i].p).norm() < 1e-9);
+    CHECK((first.clones[i].R - then.clones[i].R).norm() < 1e-12);
+  }
+  CHECK(local(first.x, turned.x, turned.p_ref).norm() > 0.1);
+  CHECK(symmetric(turned));
+  const auto spectrum = [](const State& s) {
+    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(s.P().topLeftCorner(s.size(), s.size())).eigenvalues().eval();
+  };
+  CHECK((spectrum(turned) - spectrum(before)).norm() < 1e-9 * spectrum(before).norm());
+  // What is not known of the turn and the place makes no pose unsure against another.
+  State unsure = before;
+  unsure.change_frame(yaw, p, 0.3, 10.0);
+  CHECK(symmetric(unsure));
+  const auto apart = [](const State& s) {
+    const Clone &a = s.clones.front(), &b = s.clones.back();
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, s.size());
+    J.block<6, 6>(0, a.at).setIdentity();
+    J.block<6, 6>(0, b.at) -= Matrix6d::Identity();
+    return Eigen::MatrixXd(J * s.P().topLeftCorner(s.size(), s.size()) * J.transpose());
+  };
+  CHECK((apart(unsure) - apart(turned)).norm() < 1e-9);
+  CHECK(unsure.P()(kAtt + 2, kAtt + 2) - turned.P()(kAtt + 2, kAtt + 2) == Approx(0.09));
+  CHECK(unsure.P()(kPos, kPos) - turned.P()(kPos, kPos) == Approx(100.0));
+}
