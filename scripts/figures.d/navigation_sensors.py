@@ -13,6 +13,7 @@ TURN_ON_RADPS = 0.07
 SMOOTHING_S = 1.0
 LEVER_WRONG_M = (1.0, 0.0, 0.5)
 CAR_60S = (60, 60, 120, (0, 20, 40, 60, 80, 100))
+DRAG_OFF = ("duration_s=120", "camera=mono", "camera_rate_hz=10", "picture_size=640x192", "fault=gnss.ramp@60+30:east_mps=0.3")
 
 
 def copied(runs, drive, name):
@@ -134,6 +135,11 @@ def lever_wrong_3sigma(runs):
     return runs.scored(CHANNEL, STAGES, str(folder))["honesty"]["position_m"]["within_3sigma"]
 
 
+def drag_off_m(runs):
+    """The largest horizontal error of all drives, one eye and wheels beside the receiver that drifts off."""
+    return max(channels[CHANNEL]["errors"]["horizontal_m"]["max"] for channels, _ in runs.fleet(f"vo_tracker,{STAGES}", "city_loop", SEEDS, *DRAG_OFF))
+
+
 MEASUREMENTS = {
     "no_imu_h_ratio": without_imu_ratio,
     "no_imu_30s_pct": without_imu_30s,
@@ -144,4 +150,5 @@ MEASUREMENTS = {
     "sparse_fixes_valid": sparse_fixes_valid,
     "lever_wrong_3sigma": lever_wrong_3sigma,
     "late_return_s": late_return_s,
+    "drag_off_m": drag_off_m,
 }
