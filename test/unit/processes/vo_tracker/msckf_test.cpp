@@ -152,7 +152,7 @@ TEST_CASE("mode msckf: valid while parked, then tracks the street") {
 TEST_CASE("mode msckf: the status names the front end and contains the residuals used") {
   VoTrackerConfig orb = config();
   orb.msckf.front_end.kind = FrontEndKind::kOrb;
-  orb.msckf.tuning.window.sigma_px = 0.2;  // far below the noise of ORB corners
+  orb.msckf.tuning.window.sigma_px = 0.05;  // far below the noise of its places
   const auto statuses = run(drive(0), orb).all<vo_status_t>("VO_STATUS");
   REQUIRE(!statuses.empty());
   CHECK(statuses.back().front_end == "orb");
