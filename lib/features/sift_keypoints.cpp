@@ -8,8 +8,7 @@ namespace {
 class Sift final : public KeypointDetector {
  public:
   explicit Sift(const FrontEndConfig& config)
-      : sift_(cv::SIFT::create(kKeypointsPerTrack * config.max_features, kLayers,
-                               kContrast)) {}
+      : sift_(cv::SIFT::create(kKeypointsPerTrack * config.max_features, kLayers, kContrast)) {}
 
   Keypoints detect(const cv::Mat& gray) override {
     std::vector<cv::KeyPoint> keys;

@@ -104,7 +104,7 @@ MsckfStage::MsckfStage(const Calibration& calibration, const VoTrackerConfig& co
   spec_.inputs.push_back({"VO_RESTART", "vo_restart_t", 0, kFeedback_us});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features2_t"}};
-  spec_.state_layout = 11;
+  spec_.state_layout = 12;
 }
 
 void MsckfStage::make_parts() {
