@@ -294,12 +294,19 @@ std::optional<StepDetector::Step> Filter::mend_step(double sigmas, bool displace
   const auto per_unit = state_.carried().middleCols(step->column, step->size.size()).topRows(n);
   scratch_.head(n) = per_unit * step->size;
   state_.retract(scratch_);
+  const auto widen = [&] {
+    for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += scratch_(j) * scratch_.head(n);
+  };
   const StepDetector::Small root = step->cov.llt().matrixL();
   for (int k = 0; k < root.cols(); ++k) {
     scratch_.head(n) = per_unit * root.col(k);
-    for (int j = 0; j < n; ++j) state_.P().col(j).head(n) += scratch_(j) * scratch_.head(n);
+    widen();
   }
-  steps_.begin(state_, motion_);
+  if (const auto doubt = steps_.doubted(*step, state_.x.t_us)) {
+    scratch_.head(n) = doubt->size * state_.carried().col(doubt->column).head(n);
+    widen();
+  }
+  steps_.take(*step, state_, motion_);
   return step;
 }
 

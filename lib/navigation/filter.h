@@ -67,7 +67,7 @@ class Filter {
   /// m, root mean square of what may be left of it: the largest of the level axes.
   [[nodiscard]] double return_size() const;
   /// The prior variance of the receiver's error at kGnssBias or kGnssVelocityBias becomes `ratio` times what it was,
-  /// (N.5.11): as if it had been measured as zero, or such a measurement were taken back.
+  /// (N.5.12): as if it had been measured as zero, or such a measurement were taken back.
   void rescale_gnss_bias(int at, double ratio);
   /// P += d d' over the base block.
   void widen(const BaseVector& d);

@@ -10,6 +10,7 @@ namespace {
 constexpr int64_t kApart_us = 1'000'000;  // between two moments
 constexpr double kMostOfIt = 0.5;         // of what the innovations have too much, at least, is the step's
 constexpr double kLeastEvidence = 3.0;    // measurements; fewer are outliers
+constexpr double kMemory = 16.0;          // s, as far back as a step is looked for
 constexpr double kBeyondOthers = 3.0;     // by which the logarithm of the odds exceeds that of every other kind
 
 struct Block {
@@ -19,10 +20,13 @@ struct Block {
   /// change or a clock is set once in seven, and an imu's bias, which temperature moves over minutes, hardly ever steps.
   double rarity;
 };
-constexpr std::array<Block, StepDetector::kKinds> kBlocks = {
-    Block{StepKind::kWheels, 0, 1, 2.0},         Block{StepKind::kImu, 1, 6, 7.0},
-    Block{StepKind::kReceiver, 7, 6, 0.0},       Block{StepKind::kImuClock, 13, 1, 2.0},
-    Block{StepKind::kReceiverClock, 14, 1, 2.0}, Block{StepKind::kWheelClock, 15, 1, 2.0}};
+constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
+                                Block{StepKind::kImu, 1, 6, 7.0},
+                                Block{StepKind::kReceiver, 7, 6, 0.0},
+                                Block{StepKind::kReceiver, 10, 3, 0.0},  // dragged off from where it was: nothing jumps
+                                Block{StepKind::kImuClock, 13, 1, 2.0},
+                                Block{StepKind::kReceiverClock, 14, 1, 2.0},
+                                Block{StepKind::kWheelClock, 15, 1, 2.0}};
 constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10, kImuClock = 13, kReceiverClock = 14,
               kWheelClock = 15;  // columns
 
@@ -150,23 +154,43 @@ StepDetector::Fit StepDetector::best_of(int at, int size) const {
 
 std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool displaced) const {
   if (!watches_) return std::nullopt;
-  std::array<Fit, kKinds> fits;
+  std::array<Fit, kBlocks.size()> fits;
   size_t best = 0;
-  for (size_t k = 0; k < kKinds; ++k) {
+  for (size_t k = 0; k < kBlocks.size(); ++k) {
     if (displaced && kBlocks[k].kind == StepKind::kReceiver) continue;
     fits[k] = best_of(kBlocks[k].first, kBlocks[k].size);
     fits[k].log_odds -= kBlocks[k].rarity;
     if (fits[k].log_odds > fits[best].log_odds) best = k;
   }
   if (fits[best].log_odds < 0.5 * sigmas * sigmas) return std::nullopt;
-  for (size_t k = 0; k < kKinds; ++k)
-    if (k != best && fits[best].log_odds < fits[k].log_odds + kBeyondOthers) return std::nullopt;
+  for (size_t k = 0; k < kBlocks.size(); ++k)
+    if (kBlocks[k].kind != kBlocks[best].kind && fits[best].log_odds < fits[k].log_odds + kBeyondOthers)
+      return std::nullopt;
   const auto [kind, at, size, rarity] = kBlocks[best];
   const int m = fits[best].moment;
   const double usual = std::max(1.0, usual_);
   const Posterior fit(information_[static_cast<size_t>(m)].block(at, at, size, size) / usual,
                       sum_.col(m).segment(at, size) / usual, typical_.segment(at, size));
   return Step{kind, fit.log_odds - rarity, first(m) + at, fit.mean, fit.cov};
+}
+
+std::optional<StepDetector::Doubt> StepDetector::doubted(const Step& step, int64_t t_us) const {
+  const bool lately = clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
+  if (step.kind != StepKind::kReceiver || !lately) return std::nullopt;
+  int oldest = 0;
+  age_.head<kRecent>().maxCoeff(&oldest);
+  return Doubt{first(oldest) + kReceiverClock, clock_step_};
+}
+
+void StepDetector::take(const Step& step, State& state, const BodyMotion& motion) {
+  const int64_t t_us = state.x.t_us;
+  if (step.kind == StepKind::kReceiverClock) {
+    const bool lately = clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
+    clock_step_ = (lately ? clock_step_ : 0.0) + step.size(0);
+    clock_step_us_ = t_us;
+  }
+  if (step.kind == StepKind::kReceiver) clock_step_us_ = 0;
+  begin(state, motion);
 }
 
 }  // namespace roadfix::navigation

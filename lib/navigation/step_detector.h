@@ -1,6 +1,6 @@
 /// Has something jumped, what, and when? Generalised likelihood ratio test (Willsky and Jones 1976) over a list of
 /// things that may step: for some moments it carries what a step of one unit then would have made of the filter's errors
-/// since, and how well that explains the innovations, of rejected measurements too, (N.5.8) to (N.5.10) of MODEL.md.
+/// since, and how well that explains the innovations, of rejected measurements too, (N.5.8) to (N.5.11) of MODEL.md.
 ///
 /// What a step would have made of the errors are the columns that the state carries (State::carried()), so poses of the
 /// camera have their rows too.
@@ -26,7 +26,7 @@ enum class StepKind {
 
 class StepDetector {
  public:
-  static constexpr int kKinds = 6, kMoments = 8;
+  static constexpr int kMoments = 8;
   /// Of these moments all kinds are carried, of the older ones the wheels' scale alone.
   static constexpr int kRecent = 4;
   /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate, three clocks.
@@ -83,12 +83,22 @@ class StepDetector {
   /// The step that explains most, unless chance does at this many sigmas, something else makes the innovations large, or
   /// another kind explains as much. `displaced`: the receiver is known to be, and its steps are the filter's to follow.
   [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced) const;
+  /// (N.5.11): a receiver that is dragged off along the way looks like its clock at first. Where `step` shows it
+  /// displaced: the column of that clock, and the sum of its steps of the last 16 s, s.
+  struct Doubt {
+    int column = 0;
+    double size = 0.0;
+  };
+  [[nodiscard]] std::optional<Doubt> doubted(const Step& step, int64_t t_us) const;
+  /// `step` has been taken back at that time; watches anew.
+  void take(const Step& step, State& state, const BodyMotion& motion);
+
   /// Evidence has come since the last call.
   [[nodiscard]] bool take_fresh() { return std::exchange(fresh_, false); }
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(watches_, fresh_, next_us_, turn_, usual_, age_, sum_, squares_, count_);
+    a(watches_, fresh_, next_us_, turn_, usual_, age_, sum_, squares_, count_, clock_step_, clock_step_us_);
     for (auto& m : information_) a(m);
   }
 
@@ -113,6 +123,8 @@ class StepDetector {
   bool watches_ = false, fresh_ = false;
   int64_t next_us_ = 0;
   int turn_ = 0;
+  double clock_step_ = 0.0;  ///< s, of the receiver's clock, as of doubted()
+  int64_t clock_step_us_ = 0;
   double usual_ = 1.0;  ///< mean normalised square: measurements may be noisier than they claim
   std::array<Square, kMoments> information_{Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero(),
                                             Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero()};

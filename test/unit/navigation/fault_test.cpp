@@ -18,8 +18,8 @@ struct Worst {
 };
 
 Worst drive_with(const char* fault, double duration_s, uint64_t seed, const char* second = nullptr,
-                 bool scale_steps = true) {
-  ScenarioConfig s = scenario("city_loop");
+                 bool scale_steps = true, const char* road = "city_loop") {
+  ScenarioConfig s = scenario(road);
   s.duration_s = duration_s;
   for (const char* f : {fault, second})
     if (f != nullptr) s.faults.push_back(parse_fault(f));
@@ -101,6 +101,19 @@ TEST_CASE("a receiver that is dragged off at half a metre a second is held again
   const Worst followed = drive_with("gnss.ramp@80+100:east_mps=0.5", 180.0, 2);
   CHECK(followed.resets >= 1);
   CHECK(followed.horizontal > 10.0);
+}
+
+TEST_CASE("a drag along the road is not taken for the receiver's clock for good") {
+  constexpr const char* kAlong =
+      "gnss.ramp@60+40:east_mps=0.1,north_mps=0.1";  // the road's heading there is 48 degrees
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    const Worst w = drive_with(kAlong, 150.0, seed, nullptr, true, "highway");
+    CAPTURE(seed, w.beyond, w.last);
+    CHECK(w.beyond < 6.0);  // before the drag is found, and after it
+    CHECK(w.last < 0.2);
+  }
+  // Teeth: without the step detector it is followed.
+  CHECK(drive_with(kAlong, 150.0, 1, nullptr, false, "highway").horizontal > 2.0);
 }
 
 namespace {

@@ -1,6 +1,6 @@
 /// What of a receiver's level errors lasts, from the whiteness of innovations (Mehra 1970), and how long, from its fixes
 /// against the way that the car is known to have gone: the structure function D(L) = E |e(t) - e(t - L)|^2 / 2 sigma^2 =
-/// A - B exp(-L / tau), (N.5.13) of MODEL.md. Multipath lasts seconds where the car moves past what reflects, a minute
+/// A - B exp(-L / tau), (N.5.14) of MODEL.md. Multipath lasts seconds where the car moves past what reflects, a minute
 /// where it stands, and the ionosphere's error longer.
 #pragma once
 

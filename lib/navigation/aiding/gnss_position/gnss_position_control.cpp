@@ -141,7 +141,7 @@ AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) cons
   return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
 
-/// (N.5.12): errors of Student's t. What a fix misses by beyond its noise widens that noise and the Gauss-Markov error by
+/// (N.5.13): errors of Student's t. What a fix misses by beyond its noise widens that noise and the Gauss-Markov error by
 /// the weight of the scale mixture, (nu + m) / (nu + d); no gate, and the next fix may be off by the same.
 AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias) {
   bias.std *= std::sqrt(error_time_.variance_factor());

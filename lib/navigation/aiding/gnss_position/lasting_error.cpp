@@ -12,7 +12,7 @@ namespace {
 constexpr double kAxes = 2.0;
 // Prior of the model in which nothing lasts; the others have the rest in equal parts.
 constexpr double kWhite = 0.9;
-// Least share: with none it could not be scaled where it turns out to be more, (N.5.11).
+// Least share: with none it could not be scaled where it turns out to be more, (N.5.12).
 constexpr double kLeast = 1e-4;
 constexpr double kLeastWeight = -100.0;  // logarithm, against the best model
 constexpr double kLeastSquares = 1e-6;
