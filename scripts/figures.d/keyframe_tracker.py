@@ -80,6 +80,7 @@ def nees(runs):
 
 MEASUREMENTS = {
     "kitti00_stereo_ate_m": lambda runs: stereo(runs)["ate_se3"],
+    "kitti00_stereo_shape_m": lambda runs: stereo(runs)["ate_sim3"],
     "kitti00_stereo_cpu_ms": lambda runs: cpu_ms(runs, "--count", "100"),
     "kitti00_mono_ate_m": lambda runs: mono(runs)["ate_sim3"],
     "kitti00_mono_cpu_ms": lambda runs: cpu_ms(runs, "--mono"),

@@ -1,6 +1,7 @@
 """vision: the keyframe tracker on drawn drives: POSE_VO of the shipped demo log with each front end, and the library's tracker on drives drawn anew
 (tools/experiments/vision_drives.cpp)."""
 import json
+import math
 import re
 import shutil
 import sys
@@ -19,6 +20,46 @@ def yaw_bias_deg(runs):
         raise Skipped("not all of the ten drives have poses")
     print(f"vision.yaw_bias_deg: {found.group(1)} +- {found.group(2)}", file=sys.stderr)
     return abs(float(found.group(1)))
+
+
+CITY_SEEDS = ("101", "103")
+CITY_S = "90"  # of city_loop drawn as the demo drive is, and as long
+
+
+def relative_nees(runs):
+    """{(length, "place" or "turn"): NEES of relative poses} over the ten demo drives and three of city_loop, one eye, 640x192, pooled by their windows."""
+    lens = ("--set", "focal_std=0.001", "--set", "radial_std=0.002")  # as in configs/demo
+    drives = (("demo", *SEEDS, *lens), ("city_loop", *CITY_SEEDS, *lens, "--size", "640x192", "--rate", "10", "--duration", CITY_S))
+    sums = {}
+    for words in drives:
+        text = runs.call(runs.program("vision_drives"), *words)
+        for length, place, turn, count in re.findall(r"NEES over (5 s|30 s): place ([0-9.]+) turn ([0-9.]+) \((\d+) windows\)", text):
+            for what, value in (("place", place), ("turn", turn)):
+                total, weight = sums.get((length, what), (0.0, 0))
+                sums[length, what] = total + float(value) * int(count), weight + int(count)
+    return {key: total / weight for key, (total, weight) in sums.items()}
+
+
+def nees_pictures(runs):
+    """Of rotation and translation over 5 and over 30 s the one that is farthest from one."""
+    nees = relative_nees(runs)
+    print("vision.nees_pictures:", ", ".join(f"{what} over {length} {value:.2f}" for (length, what), value in nees.items()), file=sys.stderr)
+    return max(nees.values(), key=lambda value: abs(math.log(value)))
+
+
+def highway_5hz_tracked(runs):
+    """Share of the pictures, the first included, with a pose."""
+    text = runs.call(runs.program("vision_drives"), "highway", "101", "103", "--size", "1241x376", "--rate", "5")
+    return float(re.search(r"tracked ([0-9.]+)", text).group(1))
+
+
+def second_lap_ratio(runs):
+    """Horizontal RMSE on the second lap, three drives pooled: loops closed over not."""
+    text = runs.call(runs.program("vision_drives"), "city_loop", "101", "103", "--size", "640x192", "--rate", "10", "--laps")
+    found = re.search(r"second laps: open ([0-9.]+) m, closed ([0-9.]+) m", text)
+    if not found:
+        raise Skipped("no drive comes back")
+    return float(found.group(2)) / float(found.group(1))
 
 
 FRONT_ENDS = ("klt", "orb", "sift", "superpoint")
@@ -53,6 +94,9 @@ def front_end(runs, kind):
 
 MEASUREMENTS = {
     "yaw_bias_deg": yaw_bias_deg,
+    "nees_pictures": nees_pictures,
+    "highway_5hz_tracked": highway_5hz_tracked,
+    "second_lap_ratio": second_lap_ratio,
     "worst_frontend_demo_m": lambda runs: max(front_end(runs, kind)[0] for kind in FRONT_ENDS),
     "worst_frontend_within_3sigma": lambda runs: min(front_end(runs, kind)[1] for kind in FRONT_ENDS),
 }

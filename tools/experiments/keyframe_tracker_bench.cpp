@@ -1,6 +1,8 @@
 /// Runs the keyframe tracker over a folder in KITTI's odometry layout and prints error and cost.
 ///   keyframe_tracker_bench FOLDER [--mono] [--first N] [--count N] [--from N] [--set KEY=VALUE] [--weights FILE]
+///                          [--mirror] [--reverse] [--every N]
 /// KEY is one of the tracker's configuration, for example kind=orb; FILE the network of kind=superpoint.
+/// Copies of the clip: --mirror swaps left and right, eyes included; --reverse drives backwards; --every takes each Nth frame.
 /// CPU is the whole process's, all threads, from before the first frame to after the last; pictures are decoded outside
 /// of it and their cost is printed apart.
 #include <sys/resource.h>
@@ -17,6 +19,7 @@
 #include "evaluation/alignment.h"
 #include "geometry/determinism.h"
 #include "program.h"
+#include "setter.h"
 #include "slam/keyframe_tracker.h"
 
 namespace roadfix {
@@ -27,10 +30,21 @@ using bench::cpu_ms;
 struct Sequence {
   CameraRig rig;
   std::vector<int64_t> t_us;
-  std::vector<Eigen::Vector3d> reference;
+  std::vector<SE3> reference;
 };
 
-Sequence load(const std::filesystem::path& folder, bool mono) {
+struct Copy {
+  bool mirror = false, reverse = false;
+  int every = 1;
+};
+
+cv::Mat read(const std::filesystem::path& file, bool mirror) {
+  cv::Mat picture = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+  if (mirror && !picture.empty()) cv::flip(picture, picture, 1);
+  return picture;
+}
+
+Sequence load(const std::filesystem::path& folder, bool mono, bool mirror) {
   Sequence s;
   std::map<std::string, std::vector<double>> calibration;
   std::ifstream calib(folder / "calib.txt");
@@ -53,12 +67,16 @@ Sequence load(const std::filesystem::path& folder, bool mono) {
     s.rig.right = s.rig.left;
     s.rig.T_right_left.p.x() = p1.at(3) / p1.at(0);
   }
+  if (mirror) s.rig.left.cx = s.rig.left.width - 1 - s.rig.left.cx;
+  if (mirror && !mono) s.rig.right->cx = s.rig.left.cx;
   std::ifstream times(folder / "times.txt");
   for (double t = 0; times >> t;) s.t_us.push_back(std::llround(t * 1e6) + 1);
   std::ifstream poses(folder / "poses.txt");
   for (std::array<double, 12> T{}; poses >> T[0];) {
     for (size_t i = 1; i < 12; ++i) poses >> T[i];
-    s.reference.emplace_back(T[3], T[7], T[11]);
+    Eigen::Matrix3d R;
+    R << T[0], T[1], T[2], T[4], T[5], T[6], T[8], T[9], T[10];
+    s.reference.push_back({Eigen::Quaterniond(R), {T[3], T[7], T[11]}});
   }
   return s;
 }
@@ -85,37 +103,10 @@ double median_sigma(const std::vector<PosePair>& pairs) {
   return sigmas.empty() ? 0.0 : sigmas[sigmas.size() / 2];
 }
 
-/// Sets one configuration key from text, in whatever group it stands.
-struct Setter {
-  std::string key, text;
-  bool done = false;
-  void number(const char* name, double& x, double, double) {
-    if (name == key) x = std::stod(text), done = true;
-  }
-  void integer(const char* name, int& x, int, int) {
-    if (name == key) x = std::stoi(text), done = true;
-  }
-  void boolean(const char* name, bool& x) {
-    if (name == key) x = text == "true", done = true;
-  }
-  template <class T>
-  void choice(const char* name, T& x, std::initializer_list<std::pair<const char*, T>> values) {
-    for (const auto& [word, value] : values) {
-      if (name == key && text == word) x = value, done = true;
-    }
-  }
-  template <class T>
-  void group(const char*, T& x) {
-    visit(x, *this);
-  }
-  void check(const char* name, bool ok, const std::string& what) const {
-    if (name == key && !ok) throw std::runtime_error(key + " = " + text + " " + what);
-  }
-};
-
 int run(int argc, char** argv) {
   std::filesystem::path folder;
   bool mono = false, verbose = false;
+  Copy copy;
   int first = 0, count = 100000, from = 16;
   KeyframeTrackerConfig config;
   std::vector<uint8_t> weights;
@@ -128,6 +119,12 @@ int run(int argc, char** argv) {
       mono = true;
     else if (a == "--verbose")
       verbose = true;
+    else if (a == "--mirror")
+      copy.mirror = true;
+    else if (a == "--reverse")
+      copy.reverse = true;
+    else if (a == "--every")
+      copy.every = std::stoi(value());
     else if (a == "--first")
       first = std::stoi(value());
     else if (a == "--count")
@@ -138,31 +135,31 @@ int run(int argc, char** argv) {
       std::ifstream file(value(), std::ios::binary);
       weights.assign(std::istreambuf_iterator<char>(file), {});
     } else if (a == "--set") {
-      const std::string kv = value();
-      const auto eq = kv.find('=');
-      Setter setter{kv.substr(0, eq), kv.substr(eq + 1)};
-      visit(config, setter);
-      if (!setter.done) throw std::runtime_error("unknown key " + kv);
+      bench::set_key(config, value());
     } else
       folder = a;
   }
   fix_eigen_blocking();
   fix_opencv_threads();
-  const Sequence s = load(folder, mono);
+  const Sequence s = load(folder, mono, copy.mirror);
   InlineExecutor executor;
   KeyframeTracker tracker(config, s.rig, make_front_end(config.front_end, weights), executor);
   std::vector<PosePair> pairs;
   std::vector<double> cost;
   double decode = 0.0, inliers = 0.0, matches = 0.0;
   int valid = 0, frames = 0;
-  for (int i = first; i < std::min<int>(first + count, static_cast<int>(s.t_us.size())); ++i) {
+  const int end = std::min<int>(first + count, static_cast<int>(s.t_us.size()));
+  for (int k = first; k < end; k += copy.every) {
+    const int i = copy.reverse ? first + end - 1 - k : k;
     char name[32];
     std::snprintf(name, sizeof name, "%06d.png", i);
+    const bool swap = copy.mirror && !mono;
+    const auto left = folder / (swap ? "image_1" : "image_0") / name;
+    const auto right = folder / (swap ? "image_0" : "image_1") / name;
+    const int64_t t_us = s.t_us[static_cast<size_t>(i)];
     const double t0 = cpu_ms();
-    CameraFrame frame{
-        s.t_us[static_cast<size_t>(i)], cv::imread((folder / "image_0" / name).string(), cv::IMREAD_GRAYSCALE), {}};
-    if (!mono && std::filesystem::exists(folder / "image_1" / name))
-      frame.right = cv::imread((folder / "image_1" / name).string(), cv::IMREAD_GRAYSCALE);
+    CameraFrame frame{copy.reverse ? s.t_us.back() + 1 - t_us : t_us, read(left, copy.mirror), {}};
+    if (!mono && std::filesystem::exists(right)) frame.right = read(right, copy.mirror);
     const double t1 = cpu_ms();
     const TrackedFrame& out = tracker.process(frame);
     const double t2 = cpu_ms();
@@ -182,7 +179,10 @@ int run(int argc, char** argv) {
                   out.reason.c_str());
     if (ok && i >= from && static_cast<size_t>(i) < s.reference.size()) {
       pairs.push_back({out.odometry, {}});
-      pairs.back().reference.T_frame_vehicle.p = s.reference[static_cast<size_t>(i)];
+      const SE3& T = s.reference[static_cast<size_t>(i)];
+      Eigen::Vector3d& p = pairs.back().reference.T_frame_vehicle.p;
+      p = swap ? T * Eigen::Vector3d(-s.rig.T_right_left.p) : T.p;
+      if (copy.mirror) p.x() = -p.x();
     }
   }
   std::printf("lens %.4f %.4f %.5f %.5f %.5f ", tracker.lens().value(0), tracker.lens().value(1),

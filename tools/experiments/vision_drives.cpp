@@ -1,21 +1,29 @@
 /// The keyframe tracker on drawn pictures, held against the truth: what its motion over a stretch loses.
 ///   vision_drives SCENARIO FIRST_SEED LAST_SEED [--size WIDTHxHEIGHT] [--stereo] [--from S] [--to S]
-///                 [--perspective on|off|both]
+///                 [--perspective on|off|both] [--rate HZ] [--duration S] [--set KEY=VALUE] [--weights FILE]
+///                 [--right-turn YAW,PITCH,ROLL] [--laps]
 /// Lengths are those of the drive's wheels without their scale error. `off`: affine patches without the correction of their second order
 /// (features/perspective_bend.h). Prints, per seed, yaw (positive: turned too far to the left), pitch, across and
-/// along, each estimate minus truth over the whole stretch; then means with standard errors, and the NEES of relative
-/// poses over 5 s and over the stretch, rotation and translation apart.
+/// along, each estimate minus truth over the whole stretch, and the share of pictures with a pose; then means with
+/// standard errors, and the NEES of relative poses over 5 s, 30 s and the stretch, rotation and translation apart, the
+/// 5 and 30 s by axis too, with the root mean squares of error and sigma. --right-turn: what the right camera's calibration
+/// has wrong, deg. --laps: horizontal error on the second lap, of the pose and of the one with all loops closed, each aligned
+/// in yaw and place over the whole drive. KEY is one of the tracker's configuration, for example kind=orb; FILE the network of kind=superpoint.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
+#include "evaluation/alignment.h"
 #include "features/front_end.h"
 #include "geometry/determinism.h"
 #include "geometry/so3.h"
 #include "program.h"
+#include "setter.h"
 #include "simulation/scenarios.h"
 #include "simulation/scene/film.h"
 #include "slam/keyframe_tracker.h"
@@ -25,7 +33,12 @@
 namespace roadfix {
 namespace {
 
-constexpr int64_t kWindow_us = 5'000'000;
+/// Of relative poses; the longer ones overlap.
+struct Window {
+  const char* name;
+  int64_t length_us, step_us;
+};
+constexpr std::array<Window, 2> kWindows{{{"5 s", 5'000'000, 5'000'000}, {"30 s", 30'000'000, 5'000'000}}};
 constexpr double kWheelNoise = 0.03;
 constexpr int64_t kSettle_us = 4'000'000;  ///< from the first picture to the stretch's begin
 
@@ -33,10 +46,13 @@ struct Options {
   std::string scenario;
   int first = 1, last = 1;
   int width = 0, height = 0;
-  bool stereo = false;
+  bool stereo = false, laps = false;
   double from_s = 0.0, to_s = 1e9;
+  double rate_hz = 0.0, duration_s = 0.0;                    ///< zero: the scenario's
+  Eigen::Vector3d right_turn_deg = Eigen::Vector3d::Zero();  ///< yaw, pitch, roll
   std::string perspective = "on";
   KeyframeTrackerConfig tracker;
+  std::vector<std::uint8_t> weights;
 };
 
 /// A front end that is not told of the lens: patches without the correction.
@@ -59,28 +75,35 @@ class WithoutLens final : public FrontEnd {
 
 struct Stamped {
   int64_t t_us = 0;
-  SE3 T_found, T_true;
+  int reset = 0;  ///< counter
+  SE3 T_found, T_true, T_closed;
   Matrix6d cov, image, map;
+  ScaleSensitivity scales;
 };
 
 struct Loss {
-  Vector6d error = Vector6d::Zero();  ///< place, then rotation; axes of the first pose
+  Vector6d error = Vector6d::Zero();     ///< place, then rotation; axes of the first pose
+  Vector6d variance = Vector6d::Zero();  ///< claimed, in the same axes
   double nees_place = 0.0, nees_turn = 0.0;
 };
 
-/// The motion between two poses against the true one. Its covariance: what is added between the two, and what does not
-/// accumulate, at both.
+/// The motion between two poses against the true one. Its covariance: what is added between the two, what does not
+/// accumulate, at both, and the common scales, which are the same at both (S.10.1).
 Loss loss(const Stamped& a, const Stamped& b) {
   const SE3 found = a.T_found.inverse() * b.T_found, truth = a.T_true.inverse() * b.T_true;
   Loss l;
   l.error.head<3>() = found.p - truth.p;
   l.error.tail<3>() = log_q(found.q * truth.q.conjugate());
   const Eigen::Matrix3d R = a.T_found.R();
-  const Matrix6d P = b.cov - transported(a.cov, a.T_found, found) +
-                     transported(Matrix6d(2.0 * a.image + a.map), a.T_found, found) + b.map;
+  const Matrix6d F = pose_transport_jacobian(a.T_found, found);
+  const auto without_scales = [](const Stamped& s) -> Matrix6d { return s.cov - s.scales * s.scales.transpose(); };
+  const ScaleSensitivity scales = b.scales - F * a.scales;
+  const Matrix6d P = without_scales(b) + b.map + scales * scales.transpose() -
+                     F * (without_scales(a) - 2.0 * a.image - a.map) * F.transpose();
   const Eigen::Matrix3d place = R.transpose() * P.topLeftCorner<3, 3>() * R;
   const Eigen::Matrix3d turn = found.R() * P.bottomRightCorner<3, 3>() * found.R().transpose();
   const Eigen::Vector3d p = l.error.head<3>(), r = l.error.tail<3>();
+  l.variance << place.diagonal(), turn.diagonal();
   l.nees_place = p.dot(place.ldlt().solve(p)) / 3.0;
   l.nees_turn = r.dot(turn.ldlt().solve(r)) / 3.0;
   return l;
@@ -104,14 +127,19 @@ class Run {
 
   void process(int64_t t_us, const cv::Mat& left, const cv::Mat& right) {
     const TrackedFrame& out = tracker_.process({t_us, left, right});
+    ++pictures;
     if (out.odometry.validity != Validity::kValid) return;
-    poses.push_back({t_us, out.odometry.T_frame_vehicle, drive_.truth_at(t_us).T_frame_vehicle, out.odometry.cov_pose,
-                     out.cov_image, out.cov_map});
+    poses.push_back({t_us, out.reset_counter, out.odometry.T_frame_vehicle, drive_.truth_at(t_us).T_frame_vehicle,
+                     tracker_.closed(out.odometry).T_frame_vehicle, out.odometry.cov_pose, out.cov_image, out.cov_map,
+                     out.scale_sensitivity});
     resets = out.reset_counter;
+    loops = out.num_loops;
   }
 
+  [[nodiscard]] const LensCorrection& lens() const { return tracker_.lens(); }
+
   std::vector<Stamped> poses;
-  int resets = 0;
+  int resets = 0, pictures = 0, loops = 0;
 
  private:
   static CameraRig rig_for(const Options& options, const SimulatedDrive& drive, const SimulatedRig& rig) {
@@ -120,12 +148,14 @@ class Run {
     r.T_vehicle_left = rig.T_vehicle_left;
     if (!options.stereo) return r;
     r.right = r.left;
-    r.T_right_left = T_left_right(drive.config.camera).inverse();
+    const Eigen::Vector3d turn = options.right_turn_deg * M_PI / 180.0;  // camera axes: x right, y down, z ahead
+    r.T_right_left = SE3{exp_q(Eigen::Vector3d(turn.y(), turn.x(), turn.z())), Eigen::Vector3d::Zero()} *
+                     T_left_right(drive.config.camera).inverse();
     r.scale_sigmas = {};
     return r;
   }
   static std::unique_ptr<FrontEnd> front_end(const Options& options, bool perspective) {
-    auto made = make_front_end(options.tracker.front_end);
+    auto made = make_front_end(options.tracker.front_end, options.weights);
     if (perspective) return made;
     return std::make_unique<WithoutLens>(std::move(made));
   }
@@ -142,10 +172,56 @@ cv::Mat as_sent(const GrayImage& picture, int quality) {
   return cv::imdecode(file, cv::IMREAD_GRAYSCALE);
 }
 
+/// Index of the pose at which the second lap begins: back near where the first one led away; the number of poses without one.
+size_t second_lap(const std::vector<Stamped>& poses) {
+  constexpr int64_t kOnTheWay_us = 10'000'000;
+  constexpr double kNear = 5.0, kAway = 50.0;  // m
+  size_t begin = 0;
+  while (begin < poses.size() && poses[begin].t_us - poses.front().t_us < kOnTheWay_us) ++begin;
+  bool away = false;
+  for (size_t i = begin; i < poses.size(); ++i) {
+    const double distance = (poses[i].T_true.p - poses[begin].T_true.p).head<2>().norm();
+    away = away || distance > kAway;
+    if (away && distance < kNear) return i;
+  }
+  return poses.size();
+}
+
+/// Sum of squared horizontal errors from the pose `first` on, all of them aligned in yaw and place.
+double squares_from(const std::vector<Stamped>& poses, size_t first, SE3 Stamped::*estimate) {
+  std::vector<PosePair> pairs(poses.size());
+  for (size_t i = 0; i < poses.size(); ++i) {
+    pairs[i].estimate.T_frame_vehicle = poses[i].*estimate;
+    pairs[i].reference.T_frame_vehicle = poses[i].T_true;
+  }
+  const auto S = align(pairs, Alignment::kYaw);
+  if (!S) throw std::runtime_error("the drive does not move");
+  double sum = 0.0;
+  for (size_t i = first; i < poses.size(); ++i)
+    sum += (S->T * pairs[i].estimate.T_frame_vehicle.p - poses[i].T_true.p).head<2>().squaredNorm();
+  return sum;
+}
+
 struct Totals {
+  struct Relative {
+    double place = 0.0, turn = 0.0;  ///< sums of NEES
+    Vector6d square = Vector6d::Zero(), variance = Vector6d::Zero();
+    int count = 0;
+
+    void add(const Loss& l) {
+      place += l.nees_place;
+      turn += l.nees_turn;
+      square += l.error.cwiseAbs2();
+      variance += l.variance;
+      ++count;
+    }
+  };
   std::vector<Vector6d> errors;
-  double nees[4] = {};  ///< over 5 s, place and rotation; over the stretch
-  int windows = 0;
+  std::array<Relative, kWindows.size()> windows;
+  Relative stretch;
+  int64_t poses = 0, pictures = 0;
+  double open = 0.0, closed = 0.0;  ///< sums of squared errors on second laps, m2
+  size_t on_second_lap = 0;
 };
 
 double degrees(double rad) { return rad * 180.0 / M_PI; }
@@ -161,27 +237,51 @@ void add(const char* name, int seed, const Run& run, const Options& options, int
   }
   const Loss all = loss(poses.front(), poses.back());
   totals.errors.push_back(all.error);
-  totals.nees[2] += all.nees_place;
-  totals.nees[3] += all.nees_turn;
-  for (size_t i = 0, j = 0; i < poses.size(); i = j) {
-    while (j < poses.size() && poses[j].t_us - poses[i].t_us < kWindow_us) ++j;
-    if (j == poses.size()) break;
-    const Loss l = loss(poses[i], poses[j]);
-    totals.nees[0] += l.nees_place;
-    totals.nees[1] += l.nees_turn;
-    ++totals.windows;
+  totals.stretch.add(all);
+  totals.poses += static_cast<int64_t>(run.poses.size());
+  totals.pictures += run.pictures;
+  for (size_t w = 0; w < kWindows.size(); ++w) {
+    for (size_t i = 0, j = 0; i < poses.size();) {
+      while (j < poses.size() && poses[j].t_us - poses[i].t_us < kWindows[w].length_us) ++j;
+      if (j == poses.size()) break;
+      if (poses[j].reset == poses[i].reset) totals.windows[w].add(loss(poses[i], poses[j]));
+      for (const int64_t t_us = poses[i].t_us; i < poses.size() && poses[i].t_us - t_us < kWindows[w].step_us;) ++i;
+    }
   }
   const Vector6d& e = all.error;
   std::printf(
       "%-4s seed %d: yaw %+.3f pitch %+.3f roll %+.3f deg, along %+.3f across %+.3f m, NEES place %.2f turn %.2f, %zu "
-      "poses, %d resets\n",
-      name, seed, degrees(e(5)), degrees(e(4)), degrees(e(3)), e(0), e(1), all.nees_place, all.nees_turn, poses.size(),
-      run.resets);
+      "poses of %d, %d resets\n",
+      name, seed, degrees(e(5)), degrees(e(4)), degrees(e(3)), e(0), e(1), all.nees_place, all.nees_turn,
+      run.poses.size(), run.pictures, run.resets);
+  if (options.laps) {
+    const size_t second = second_lap(poses), count = poses.size() - second;
+    const double open = squares_from(poses, second, &Stamped::T_found);
+    const double closed = squares_from(poses, second, &Stamped::T_closed);
+    const auto n = static_cast<double>(std::max<size_t>(1, count));
+    std::printf("%-4s seed %d: second lap %zu poses, open %.3f m, closed %.3f m, %d loops\n", name, seed, count,
+                std::sqrt(open / n), std::sqrt(closed / n), run.loops);
+    totals.open += open;
+    totals.closed += closed;
+    totals.on_second_lap += count;
+  }
+  if (options.stereo) {
+    const Eigen::Vector3d turn = run.lens().value.segment<3>(LensCorrection::kRightRotation) * 180.0 / M_PI;
+    std::printf("%-4s seed %d: right camera turned by yaw %+.4f pitch %+.4f roll %+.4f deg\n", name, seed, turn.y(),
+                turn.x(), turn.z());
+  }
   std::fflush(stdout);
 }
 
 void print(const char* name, const Totals& t) {
   const auto n = static_cast<double>(t.errors.size());
+  if (t.pictures > 0)
+    std::printf("%-4s tracked %.4f\n", name, static_cast<double>(t.poses) / static_cast<double>(t.pictures));
+  if (t.on_second_lap > 0) {
+    const auto lap = static_cast<double>(t.on_second_lap);
+    std::printf("%-4s second laps: open %.4f m, closed %.4f m\n", name, std::sqrt(t.open / lap),
+                std::sqrt(t.closed / lap));
+  }
   if (t.errors.size() < 2) return;
   Vector6d mean = Vector6d::Zero(), square = Vector6d::Zero();
   for (const Vector6d& e : t.errors) mean += e / n;
@@ -192,13 +292,27 @@ void print(const char* name, const Totals& t) {
       "yaw %.3f\n",
       name, n, degrees(mean(5)), degrees(error(5)), degrees(mean(4)), degrees(error(4)), mean(0), error(0), mean(1),
       error(1), degrees(std::sqrt(square(5) + mean(5) * mean(5))));
-  std::printf("%-4s NEES over 5 s: place %.2f turn %.2f (%d windows); over the stretch: place %.2f turn %.2f\n", name,
-              t.nees[0] / t.windows, t.nees[1] / t.windows, t.windows, t.nees[2] / n, t.nees[3] / n);
+  const auto relative = [&](const char* what, const Totals::Relative& r) {
+    if (r.count == 0) return;
+    std::printf("%-4s NEES over %s: place %.2f turn %.2f (%d windows); rms error / sigma:", name, what,
+                r.place / r.count, r.turn / r.count, r.count);
+    constexpr std::array<const char*, 6> kAxes{"along", "across", "up", "roll", "pitch", "yaw"};
+    for (int k = 0; k < 6; ++k) {
+      const double unit = k < 3 ? 1.0 : 180.0 / M_PI;
+      std::printf(" %s %.4f/%.4f", kAxes[static_cast<size_t>(k)], unit * std::sqrt(r.square(k) / r.count),
+                  unit * std::sqrt(r.variance(k) / r.count));
+    }
+    std::printf("\n");
+  };
+  for (size_t w = 0; w < kWindows.size(); ++w) relative(kWindows[w].name, t.windows[w]);
+  relative("the stretch", t.stretch);
 }
 
 void drive(const Options& options, int seed, std::vector<Totals>& totals) {
   ScenarioConfig config = scenario(options.scenario);
   if (options.width > 0) config.camera = with_size(config.camera, options.width, options.height);
+  if (options.rate_hz > 0.0) config.camera.rate_hz = options.rate_hz;
+  if (options.duration_s > 0.0) config.duration_s = options.duration_s;
   config.camera.layout = options.stereo ? CameraLayout::kStereo : CameraLayout::kMono;
   const SimulatedDrive drive = simulate(config, static_cast<std::uint64_t>(seed));
   const SimulatedRig rig = rig_of(drive);
@@ -233,8 +347,8 @@ Options parse(int argc, char** argv) {
   o.last = std::stoi(argv[3]);
   for (int i = 4; i < argc; ++i) {
     const std::string key = argv[i];
-    if (key == "--stereo") {
-      o.stereo = true;
+    if (key == "--stereo" || key == "--laps") {
+      (key == "--stereo" ? o.stereo : o.laps) = true;
       continue;
     }
     if (++i == argc) throw std::invalid_argument(key + " needs a value");
@@ -246,6 +360,19 @@ Options parse(int argc, char** argv) {
       o.from_s = std::stod(value);
     } else if (key == "--to") {
       o.to_s = std::stod(value);
+    } else if (key == "--rate") {
+      o.rate_hz = std::stod(value);
+    } else if (key == "--duration") {
+      o.duration_s = std::stod(value);
+    } else if (key == "--right-turn") {
+      Eigen::Vector3d& turn = o.right_turn_deg;
+      if (std::sscanf(value.c_str(), "%lf,%lf,%lf", &turn.x(), &turn.y(), &turn.z()) != 3)
+        throw std::invalid_argument("--right-turn: YAW,PITCH,ROLL");
+    } else if (key == "--set") {
+      bench::set_key(o.tracker, value);
+    } else if (key == "--weights") {
+      std::ifstream file(value, std::ios::binary);
+      o.weights.assign(std::istreambuf_iterator<char>(file), {});
     } else if (key == "--perspective") {
       if (value != "on" && value != "off" && value != "both")
         throw std::invalid_argument("--perspective: on, off, both");
