@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/decentring.h"
 #include "features/flow.h"
 #include "features/patch.h"
 #include "geometry/so3.h"
@@ -76,10 +77,11 @@ class SearchPatch {
 StereoMatcher::StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left,
                              const StereoConfig& config)
     : left_(left), right_(right), config_(config) {
-  set_extrinsics(T_right_left);
+  set_extrinsics(T_right_left, Eigen::Vector2d::Zero());
 }
 
-void StereoMatcher::set_extrinsics(const SE3& T_right_left) {
+void StereoMatcher::set_extrinsics(const SE3& T_right_left, const Eigen::Vector2d& decentring) {
+  decentring_ = decentring;
   T_right_left_ = T_right_left;
   E_ = skew(T_right_left.p) * T_right_left.R();
 }
@@ -88,7 +90,9 @@ std::optional<Eigen::Vector2f> StereoMatcher::right_pixel(const Eigen::Vector2d&
                                                           double inverse_depth) const {
   // The point in right-camera axes times its inverse depth: finite at infinity too.
   const Eigen::Vector3d p = T_right_left_.q * normalised.homogeneous() + inverse_depth * T_right_left_.p;
-  const auto pixel = right_.project(p);
+  if (!(p.z() > 0.0)) return std::nullopt;
+  const Eigen::Vector2d n = p.hnormalized();
+  const auto pixel = right_.project((n + decentring_shift(n, decentring_)).homogeneous());
   if (!pixel) return std::nullopt;
   return Eigen::Vector2f(pixel->cast<float>());
 }
@@ -162,7 +166,8 @@ std::vector<std::optional<Eigen::Vector2f>> StereoMatcher::match(const cv::Mat& 
     if (!place) continue;
     const Eigen::Vector2f found = place->point(*patch);
     const auto seen = right_.unproject(found.cast<double>());
-    if (seen && epipolar_error_px(*normalised, *seen) <= config_.max_epipolar_px) result[i] = found;
+    if (seen && epipolar_error_px(*normalised, undo_decentring(*seen, decentring_)) <= config_.max_epipolar_px)
+      result[i] = found;
   }
   return result;
 }

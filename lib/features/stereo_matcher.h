@@ -46,8 +46,8 @@ class RightImageMatcher {
   RightImageMatcher(const RightImageMatcher&) = default;
   RightImageMatcher& operator=(const RightImageMatcher&) = default;
 
-  /// Sets refined extrinsics of the right camera.
-  virtual void set_extrinsics(const SE3& T_right_left) = 0;
+  /// Sets refined extrinsics and the decentring (camera/decentring.h) of the right camera.
+  virtual void set_extrinsics(const SE3& T_right_left, const Eigen::Vector2d& decentring) = 0;
 
   /// The right pixel of each query, or no value.
   [[nodiscard]] virtual std::vector<std::optional<Eigen::Vector2f>> match(
@@ -58,7 +58,7 @@ class StereoMatcher final : public RightImageMatcher {
  public:
   StereoMatcher(const Camera& left, const Camera& right, const SE3& T_right_left, const StereoConfig& config);
 
-  void set_extrinsics(const SE3& T_right_left) override;
+  void set_extrinsics(const SE3& T_right_left, const Eigen::Vector2d& decentring) override;
   [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat& left, const cv::Mat& right,
                                                                   std::span<const StereoQuery> queries) const override;
 
@@ -72,7 +72,8 @@ class StereoMatcher final : public RightImageMatcher {
 
   Camera left_, right_;
   SE3 T_right_left_;
-  Eigen::Matrix3d E_;  ///< essential matrix: right' E left = 0
+  Eigen::Vector2d decentring_ = Eigen::Vector2d::Zero();  ///< of the right camera
+  Eigen::Matrix3d E_;                                     ///< essential matrix: right' E left = 0
   StereoConfig config_;
 };
 

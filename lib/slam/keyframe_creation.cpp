@@ -201,7 +201,7 @@ void KeyframeTracker::make_keyframe(const CameraFrame& frame, const std::vector<
       }
       queries.push_back(query);
     }
-    stereo_->set_extrinsics(map_.lens().corrected_extrinsics(rig_.T_right_left));
+    stereo_->set_extrinsics(map_.lens().corrected_extrinsics(rig_.T_right_left), map_.lens().right_decentring());
     right = stereo_->match(frame.left, frame.right, queries);
     record_right_pixels(all, right);
   }

@@ -23,7 +23,8 @@ LensCorrection::Matrix prior_information(const KeyframeTrackerConfig& config, bo
   };
   LensCorrection::Vector diagonal;
   diagonal << information(stereo ? 0.0 : config.focal_std), information(stereo ? 0.0 : config.radial_std),
-      Eigen::Vector3d::Constant(information(config.right_turn_std_deg * kDegree));
+      Eigen::Vector3d::Constant(information(config.right_turn_std_deg * kDegree)),
+      Eigen::Vector2d::Constant(information(config.right_decentring_std));
   return diagonal.asDiagonal();
 }
 
@@ -108,7 +109,7 @@ std::optional<Eigen::Vector3d> LocalMap::locate(const Landmark& landmark) const 
   for (const LandmarkObservation& s : landmark.observations) {
     const SE3& T_map_camera = keyframe(s.keyframe)->T_map_camera;
     rays.push_back(ray(T_map_camera, lens_.remove(s.left)));
-    if (s.right) rays.push_back(ray(T_map_camera * T_left_right, lens_.remove(*s.right)));
+    if (s.right) rays.push_back(ray(T_map_camera * T_left_right, lens_.remove_right(*s.right)));
   }
   const bool stereo = landmark.observations.back().right.has_value();
   const double angle = stereo ? config_.min_disparity_px / focal_px_ : config_.min_parallax_deg * kDegree;

@@ -18,6 +18,17 @@ Eigen::Vector2d LensCorrection::remove(const Eigen::Vector2d& normalised) const 
   return direction;
 }
 
+Eigen::Vector2d LensCorrection::apply_right(const Eigen::Vector2d& direction) const {
+  return apply(direction) + decentring_shift(direction, right_decentring());
+}
+
+Eigen::Vector2d LensCorrection::remove_right(const Eigen::Vector2d& normalised) const {
+  constexpr int kSteps = 4;  // as in undo_decentring()
+  Eigen::Vector2d direction = remove(normalised);
+  for (int i = 0; i < kSteps; ++i) direction = remove(normalised - decentring_shift(direction, right_decentring()));
+  return direction;
+}
+
 SE3 LensCorrection::corrected_extrinsics(const SE3& T_right_left) const {
   const SE3 turn{exp_q(value.segment<3>(kRightRotation)), Eigen::Vector3d::Zero()};
   return turn * SE3{T_right_left.q, std::exp(-value(kFocal)) * T_right_left.p};
@@ -48,24 +59,28 @@ bool PosedCamera::project(const Eigen::Vector3d& p_map, Eigen::Vector2d& normali
   const double inverse_depth = 1.0 / p_eye.z();
   const Eigen::Vector2d n = p_eye.head<2>() * inverse_depth;
   const double r2 = n.squaredNorm(), radial = lens_.value(LensCorrection::kRadial);
-  normalised = scale_ * (1.0 + radial * r2) * n;
+  const Eigen::Vector2d bent = scale_ * (1.0 + radial * r2) * n;
+  normalised = bent;
+  if (right_) normalised += decentring_shift(n, lens_.right_decentring());
   if (J == nullptr) return true;
 
   Eigen::Matrix<double, 2, 3> J_perspective;
   J_perspective << inverse_depth, 0.0, -n.x() * inverse_depth, 0.0, inverse_depth, -n.y() * inverse_depth;
-  const Eigen::Matrix2d J_bend =
+  Eigen::Matrix2d J_bend =
       scale_ * ((1.0 + radial * r2) * Eigen::Matrix2d::Identity() + 2.0 * radial * n * n.transpose());
+  if (right_) J_bend += decentring_jacobian(n, lens_.right_decentring());
   const Eigen::Matrix<double, 2, 3> J_eye = J_bend * J_perspective;
   const Eigen::Matrix<double, 2, 3> J_camera = J_eye * R_eye_camera_;
   J->point = J_camera * R_camera_map_;
   J->pose.leftCols<3>() = -J->point;
   J->pose.rightCols<3>() = J_camera * skew(p_camera);
-  J->correction.col(LensCorrection::kFocal) = normalised;
+  J->correction.col(LensCorrection::kFocal) = bent;
   J->correction.col(LensCorrection::kRadial) = scale_ * r2 * n;
-  J->correction.rightCols<3>().setZero();
+  J->correction.rightCols<LensCorrection::kSize - LensCorrection::kRightRotation>().setZero();
   if (right_) {
     J->correction.col(LensCorrection::kFocal) -= J_eye * p_eye_camera_;
-    J->correction.rightCols<3>() = -J_eye * skew(p_eye) * J_rotation_;
+    J->correction.middleCols<2>(LensCorrection::kRightDecentring) = decentring_sensitivity(n);
+    J->correction.middleCols<3>(LensCorrection::kRightRotation) = -J_eye * skew(p_eye) * J_rotation_;
   }
   return true;
 }

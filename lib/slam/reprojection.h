@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 
+#include "camera/decentring.h"
 #include "geometry/se3.h"
 
 namespace roadfix {
@@ -11,12 +12,13 @@ namespace roadfix {
 inline constexpr double kMinReprojectionDepth = 0.05;
 
 /// Correction of the calibration, estimated beside the motion; zero: as calibrated. Order of the vector: kFocal,
-/// kRadial, kRightRotation (3).
+/// kRadial, kRightRotation (3), kRightDecentring (2).
 struct LensCorrection {
-  static constexpr int kSize = 5;
-  static constexpr int kFocal = 0;          ///< logarithm of true over calibrated focal length, both cameras
-  static constexpr int kRadial = 1;         ///< coefficient of r^2 remaining after undistortion, both cameras
-  static constexpr int kRightRotation = 2;  ///< rad, rotation vector of the right camera about its own centre
+  static constexpr int kSize = 7;
+  static constexpr int kFocal = 0;            ///< logarithm of true over calibrated focal length, both cameras
+  static constexpr int kRadial = 1;           ///< coefficient of r^2 remaining after undistortion, both cameras
+  static constexpr int kRightRotation = 2;    ///< rad, rotation vector of the right camera about its own centre
+  static constexpr int kRightDecentring = 5;  ///< of the right camera against the left, camera/decentring.h
   using Vector = Eigen::Matrix<double, kSize, 1>;
   using Matrix = Eigen::Matrix<double, kSize, kSize>;
 
@@ -26,6 +28,10 @@ struct LensCorrection {
   [[nodiscard]] Eigen::Vector2d apply(const Eigen::Vector2d& direction) const;
   /// Inverse of apply().
   [[nodiscard]] Eigen::Vector2d remove(const Eigen::Vector2d& normalised) const;
+  /// Calibrated coordinates in the right camera of a true direction of it, and the inverse.
+  [[nodiscard]] Eigen::Vector2d apply_right(const Eigen::Vector2d& direction) const;
+  [[nodiscard]] Eigen::Vector2d remove_right(const Eigen::Vector2d& normalised) const;
+  [[nodiscard]] Eigen::Vector2d right_decentring() const { return value.segment<2>(kRightDecentring); }
   /// T_right_left as calibrated, with the corrected rotation. The baseline is divided by the focal length correction:
   /// their product, which converts disparity to depth, is what a stereo calibration determines best.
   [[nodiscard]] SE3 corrected_extrinsics(const SE3& T_right_left) const;

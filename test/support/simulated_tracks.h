@@ -56,7 +56,7 @@ class SimulatedFrontEnd final : public FrontEnd {
 class SimulatedRightEye final : public RightImageMatcher {
  public:
   explicit SimulatedRightEye(std::shared_ptr<const SeenTracks> seen) : seen_(std::move(seen)) {}
-  void set_extrinsics(const SE3&) override {}
+  void set_extrinsics(const SE3&, const Eigen::Vector2d&) override {}
   [[nodiscard]] std::vector<std::optional<Eigen::Vector2f>> match(const cv::Mat&, const cv::Mat&,
                                                                   std::span<const StereoQuery> queries) const override {
     std::vector<std::optional<Eigen::Vector2f>> found;

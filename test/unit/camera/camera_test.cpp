@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "camera/decentring.h"
 #include "support/numerical_jacobian.h"
 
 namespace roadfix {
@@ -90,6 +91,25 @@ TEST_CASE("only pixels inside the image are visible") {
   CHECK(camera.sees({1240.0, 375.0}));
   CHECK_FALSE(camera.sees({1240.1, 10.0}));
   CHECK_FALSE(camera.sees({5.0, 10.0}, 8.0));
+}
+
+TEST_CASE("decentring is a rotation and a shift of the principal point, but for its part across the radius") {
+  const Eigen::Vector2d p(2e-3, -1e-3);
+  for (const Eigen::Vector3d& point : points_in_view(20)) {
+    const Eigen::Vector2d n = point.hnormalized(), shift = decentring_shift(n, p);
+    const Eigen::Vector2d brown = n.squaredNorm() * p + 2.0 * p.dot(n) * n;
+    const Eigen::Vector3d axis = 3.0 * Eigen::Vector3d(-p.y(), p.x(), 0.0);
+    const Eigen::Vector2d turned = (point + point.cross(axis)).hnormalized() - n;  // by minus 3 p
+    CHECK((brown + turned + 3.0 * p - shift).norm() < 1e-4);                       // second order of the rotation
+    CHECK(std::abs(shift.dot(n)) < 1e-15);
+    CHECK((undo_decentring(n + shift, p) - n).norm() < 1e-9);
+    const auto by_n =
+        test::numerical_jacobian<2, 2>([&](const Eigen::Vector2d& d) { return decentring_shift(n + d, p); });
+    const auto by_p =
+        test::numerical_jacobian<2, 2>([&](const Eigen::Vector2d& d) { return decentring_shift(n, p + d); });
+    CHECK((decentring_jacobian(n, p) - by_n).norm() < 1e-8);
+    CHECK((decentring_sensitivity(n) - by_p).norm() < 1e-8);
+  }
 }
 
 }  // namespace

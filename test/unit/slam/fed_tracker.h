@@ -54,7 +54,7 @@ class FedTracker {
 
 inline KeyframeTrackerConfig exact_lens() {
   KeyframeTrackerConfig config;
-  config.focal_std = config.radial_std = config.right_turn_std_deg = 0.0;
+  config.focal_std = config.radial_std = config.right_turn_std_deg = config.right_decentring_std = 0.0;
   config.close_loops = false;
   return config;
 }

@@ -37,7 +37,8 @@ Eigen::Vector3d some_point(Rng& random) {
 LensCorrection some_lens(Rng& random) {
   LensCorrection lens;
   lens.value << uniform(random, -0.02, 0.02), uniform(random, -0.03, 0.03), uniform(random, -0.01, 0.01),
-      uniform(random, -0.01, 0.01), uniform(random, -0.01, 0.01);
+      uniform(random, -0.01, 0.01), uniform(random, -0.01, 0.01), uniform(random, -0.01, 0.01),
+      uniform(random, -0.01, 0.01);
   return lens;
 }
 
@@ -81,6 +82,7 @@ TEST_CASE("remove() inverts apply() of a lens correction") {
     const LensCorrection lens = some_lens(random);
     const Eigen::Vector2d direction(uniform(random, -0.8, 0.8), uniform(random, -0.5, 0.5));
     REQUIRE((lens.remove(lens.apply(direction)) - direction).norm() < 1e-9);
+    REQUIRE((lens.remove_right(lens.apply_right(direction)) - direction).norm() < 1e-8);
   }
 }
 
