@@ -205,7 +205,7 @@ class Tool(unittest.TestCase):
             self.assertRegex(done.stdout, r"(?m)^REFERENCE .*aligned|^REFERENCE")
 
     def test_version_everywhere(self):
-        programs = ["roadfix", "gnss_ins_ekf", "imm_fusion", "vo_tracker", "wheel_odometry", "monitor", "recorder", "camera_driver",
+        programs = ["roadfix", "gnss_ins_ekf", "imm_fusion", "integrity", "vo_tracker", "wheel_odometry", "monitor", "recorder", "camera_driver",
                     "gnss_driver", "imu_driver", "pose_server", "wheel_driver"]
         cmake = (ROOT / "CMakeLists.txt").read_text()
         version = re.search(r"project\(roadfix VERSION ([0-9.]+)", cmake)[1]
