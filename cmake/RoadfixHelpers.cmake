@@ -47,17 +47,6 @@ macro(roadfix_unity)
   endif()
 endmacro()
 
-# The same for one library above that line, where ROADFIX_UNITY_ALL wants it and ROADFIX_UNITY_NOT does not name it. Other libraries have names
-# of unnamed namespaces that two of their sources share.
-set(ROADFIX_UNITY_LIBRARIES camera geodesy geometry inertial statistics stream vehicle wheel)
-function(roadfix_unity_library NAME)
-  if(NAME IN_LIST ROADFIX_UNITY_NOT)
-    set_target_properties(roadfix_${NAME} PROPERTIES UNITY_BUILD OFF)
-  elseif(ROADFIX_UNITY AND ROADFIX_UNITY_ALL AND NAME IN_LIST ROADFIX_UNITY_LIBRARIES)
-    set_target_properties(roadfix_${NAME} PROPERTIES UNITY_BUILD ON)
-  endif()
-endfunction()
-
 # roadfix_library(NAME SOURCES a.cpp ... DEPS geometry ... SYSTEM_DEPS target ...) makes the target roadfix_NAME, included as "NAME/header.h".
 # A library without sources is header-only. DEPS are Roadfix libraries, public.
 function(roadfix_library NAME)
@@ -68,7 +57,6 @@ function(roadfix_library NAME)
     target_include_directories(roadfix_${NAME} PUBLIC ${PROJECT_SOURCE_DIR}/lib)
     target_link_libraries(roadfix_${NAME} PUBLIC ${ARG_DEPS} roadfix_eigen PRIVATE roadfix_options ${ARG_SYSTEM_DEPS})
     target_precompile_headers(roadfix_${NAME} REUSE_FROM roadfix_pch)
-    roadfix_unity_library(${NAME})
   else()
     add_library(roadfix_${NAME} INTERFACE)
     target_include_directories(roadfix_${NAME} INTERFACE ${PROJECT_SOURCE_DIR}/lib)

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import types
 import unittest
 from pathlib import Path
 
@@ -43,24 +42,6 @@ class Check(unittest.TestCase):
         self.assertEqual(check.test_programs(folder, False), (["wheel_test"], ["wheel_statistics_test"]))
         self.assertEqual(check.test_programs(folder, True), (["wheel_test", "wheel_statistics_test"], []))
         self.assertEqual(check.library_target(folder), "roadfix_wheel")
-
-    def taken_out(self, cached, name):
-        """Which libraries CMake is told to compile a source at a time when `name` is checked in a folder with this cache."""
-        with tempfile.TemporaryDirectory() as folder:
-            check = load(self.script)
-            check.BUILD = Path(folder)
-            (check.BUILD / "CMakeCache.txt").write_text(cached)
-            told = []
-            check.subprocess = types.SimpleNamespace(run=lambda words, **rest: told.append(words[1]), DEVNULL=None)
-            check.compile_alone(name)
-            return told
-
-    def test_what_is_worked_on_is_compiled_a_source_at_a_time(self):
-        new = "ROADFIX_UNITY_ALL:BOOL=ON\nROADFIX_UNITY_NOT:STRING=\n"
-        self.assertEqual(self.taken_out(new, "wheel"), ["-DROADFIX_UNITY_NOT=wheel"])
-        self.assertEqual(self.taken_out(new.replace("NOT:STRING=", "NOT:STRING=slam"), "wheel"), ["-DROADFIX_UNITY_NOT=slam;wheel"])
-        self.assertEqual(self.taken_out(new.replace("NOT:STRING=", "NOT:STRING=slam;wheel"), "wheel"), [])
-        self.assertEqual(self.taken_out(new.replace("=ON", "=OFF"), "wheel"), [])
 
     def test_a_nested_library_is_not_its_parent(self):
         check = load(self.script)
@@ -125,7 +106,7 @@ class WithoutTests(unittest.TestCase):
 
     def test_a_new_folder_has_tests_unless_told(self):
         self.assertEqual(self.configured([]), "--preset release\n")
-        self.assertEqual(self.configured(["--without-tests", "release", "roadfix"]), "--preset release -DROADFIX_TESTS=OFF -DROADFIX_UNITY_ALL=ON\n")
+        self.assertEqual(self.configured(["--without-tests", "release", "roadfix"]), "--preset release -DROADFIX_TESTS=OFF\n")
 
     def test_tests_are_added_and_never_taken_away(self):
         self.assertEqual(self.configured(["release"], cached="OFF"), "setup \n--preset release\n")
