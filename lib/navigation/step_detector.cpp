@@ -175,18 +175,20 @@ std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool 
 }
 
 std::optional<StepDetector::Doubt> StepDetector::doubted(const Step& step, int64_t t_us) const {
-  const bool lately = clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
-  if (step.kind != StepKind::kReceiver || !lately) return std::nullopt;
+  if (step.kind != StepKind::kReceiver || !clock_stepped_lately(t_us)) return std::nullopt;
   int oldest = 0;
   age_.head<kRecent>().maxCoeff(&oldest);
   return Doubt{first(oldest) + kReceiverClock, clock_step_};
 }
 
+bool StepDetector::clock_stepped_lately(int64_t t_us) const {
+  return clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
+}
+
 void StepDetector::take(const Step& step, State& state, const BodyMotion& motion) {
   const int64_t t_us = state.x.t_us;
   if (step.kind == StepKind::kReceiverClock) {
-    const bool lately = clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
-    clock_step_ = (lately ? clock_step_ : 0.0) + step.size(0);
+    clock_step_ = (clock_stepped_lately(t_us) ? clock_step_ : 0.0) + step.size(0);
     clock_step_us_ = t_us;
   }
   if (step.kind == StepKind::kReceiver) clock_step_us_ = 0;

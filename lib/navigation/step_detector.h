@@ -117,15 +117,16 @@ class StepDetector {
   };
   void begin(State& state, const BodyMotion& motion, int moment);
   [[nodiscard]] Fit best_of(int at, int size) const;
+  [[nodiscard]] bool clock_stepped_lately(int64_t t_us) const;
 
   Sizes typical_;
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
   bool watches_ = false, fresh_ = false;
   int64_t next_us_ = 0;
   int turn_ = 0;
-  double clock_step_ = 0.0;  ///< s, of the receiver's clock, as of doubted()
-  int64_t clock_step_us_ = 0;
-  double usual_ = 1.0;  ///< mean normalised square: measurements may be noisier than they claim
+  double clock_step_ = 0.0;    ///< s, of the receiver's clock, as of doubted()
+  int64_t clock_step_us_ = 0;  ///< of the last of them; 0: none
+  double usual_ = 1.0;         ///< mean normalised square: measurements may be noisier than they claim
   std::array<Square, kMoments> information_{Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero(),
                                             Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero()};
   Eigen::Matrix<double, kWidth, kMoments> sum_ = Eigen::Matrix<double, kWidth, kMoments>::Zero();
