@@ -1,7 +1,9 @@
 #include "navigation/filter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include "geometry/so3.h"
 
@@ -20,17 +22,19 @@ constexpr double kFadeTime = 2.5;    // s
 constexpr double kFadeSpread = 1.2;  // of the logarithm
 constexpr double kFadeWalk = 0.3;    // of the logarithm, 1/sqrt(s)
 
+constexpr int kMostConsidered = 8;  // states: the receiver's and the imu's clocks, an antenna
+
 double square(double x) { return x * x; }
 
 // How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they
 // differ from one turn-on to the next, a receiver that follows a reflection or is dragged off, a clock that is set by
-// another one. Without an imu there is no clock of its own.
+// another one, an arm that was read off wrong. Without an imu there is no clock of its own.
 StepDetector::Sizes typical_steps(const VehicleFacts& v) {
-  constexpr double kScale = 0.02, kDisplacement = 5.0, kDrag = 0.5, kClock = 0.05;  // 1, m, m/s, s
+  constexpr double kScale = 0.02, kArm = 0.5, kDisplacement = 5.0, kDrag = 0.5, kClock = 0.05;  // 1, m, m, m/s, s
   StepDetector::Sizes s;
   s << kScale, Eigen::Vector3d::Constant(v.gyro_bias_std), Eigen::Vector3d::Constant(v.accel_bias_std),
       Eigen::Vector3d::Constant(kDisplacement), Eigen::Vector3d::Constant(kDrag), v.has_imu ? kClock : 0.0, kClock,
-      kClock;
+      kClock, Eigen::Vector3d::Constant(kArm);
   return s;
 }
 
@@ -257,18 +261,19 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
     for (int k = 0; k < i; ++k) Y.col(i) -= innovation.L(i, k) * Y.col(k);
     Y.col(i) /= innovation.L(i, i);
   }
+  std::array<int, kMostConsidered> list{};
+  size_t count = 0;
+  for (const Considered& c : {considered_, m.considered})
+    for (int i = 0; i < c.size; ++i) list[count++] = c.first + i;
+  const std::span<const int> kept(list.data(), count);  // states without a gain, (N.3.4)
+  using Kept = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostConsidered, kMostConsidered>;
+  const Kept cov = P(kept, kept);
+  state_.subtract(Y);
+  state_.P()(kept, kept) = cov;
+  for (const int i : kept) Y.row(i).setZero();
   steps_.use<Rows>(state_, m.H, innovation.L, innovation.whitened, Y, evidence);
-  Eigen::VectorXd& d = scratch_;
-  d.head(n) = Y.lazyProduct(innovation.whitened);
-  if (considered_size_ == 0) {
-    state_.subtract(Y);
-  } else {
-    const Eigen::MatrixXd kept = P.block(considered_first_, considered_first_, considered_size_, considered_size_);
-    state_.subtract(Y);
-    state_.P().block(considered_first_, considered_first_, considered_size_, considered_size_) = kept;
-    d.segment(considered_first_, considered_size_).setZero();
-  }
-  state_.correct(d);
+  scratch_.head(n) = Y.lazyProduct(innovation.whitened);
+  state_.correct(scratch_);
 }
 
 template <int Rows>

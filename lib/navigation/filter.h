@@ -40,11 +40,8 @@ class Filter {
   template <int Rows>
   [[nodiscard]] AidingRecord judge(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) const;
 
-  /// States that measurements do not move from now on, though their uncertainty counts (Schmidt 1966).
-  void consider(int first, int size) {
-    considered_first_ = first;
-    considered_size_ = size;
-  }
+  /// States that no measurement moves from now on.
+  void consider(const Considered& states) { considered_ = states; }
   /// A rejected measurement is evidence for steps, and nothing else.
   template <int Rows>
   void reject(const Measurement<Rows>& m);
@@ -103,7 +100,7 @@ class Filter {
     last_.serialise(a);
     steps_.serialise(a);
     motion_.lag.serialise(a);
-    a(motion_.rate, motion_.acceleration, considered_first_, considered_size_, gnss_bias_.position_std,
+    a(motion_.rate, motion_.acceleration, considered_.first, considered_.size, gnss_bias_.position_std,
       gnss_bias_.velocity_std, gnss_bias_.position_time, gnss_bias_.velocity_time, gnss_bias_.position_walk);
   }
   void digest(Digest& digest) const { state_.digest(digest); }
@@ -132,7 +129,7 @@ class Filter {
   inertial::TransitionSums sums_;
   inertial::InertialStep last_;
   BodyMotion motion_;
-  int considered_first_ = 0, considered_size_ = 0;
+  Considered considered_;
   GnssBias gnss_bias_;
   StepDetector steps_;
   Eigen::VectorXd scratch_;  // a correction

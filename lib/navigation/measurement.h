@@ -10,6 +10,11 @@
 
 namespace roadfix::navigation {
 
+/// States that a measurement does not move, though their uncertainty counts (Schmidt 1966), (N.3.4).
+struct Considered {
+  int first = 0, size = 0;
+};
+
 /// residual = z - h(x_hat);  h(x (+) d) = h(x) + H d.
 template <int Rows>
 struct Measurement {
@@ -18,6 +23,7 @@ struct Measurement {
   Eigen::Matrix<double, Rows, Rows> R = Eigen::Matrix<double, Rows, Rows>::Identity();
   double repeated =
       0.0;  ///< added to R's diagonal in the update alone: errors that the next ones repeat (Bartlett 1946)
+  Considered considered;
 };
 
 enum class AidingSource {

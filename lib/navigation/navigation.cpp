@@ -337,7 +337,7 @@ void Navigation::end_alignment() {
     camera_->skip_before(last_step_us_, filter_->state().x);
   } else {
     filter_.emplace(all.leader());
-    filter_->consider(0, 0);
+    filter_->consider({});
   }
   if (config_.aiding.step_detection) filter_->watch_for_steps();
   all.stop();
@@ -449,6 +449,7 @@ void Navigation::mend_steps() {
   const auto step = filter_->mend_step(config_.aiding.gate_sigma, gnss.displaced());
   if (!step) return;
   if (step->kind == StepKind::kWheels) ++steps_;
+  if (step->kind == StepKind::kLeverArm) arm_contradicted_ = true;
   aiding_.forget_way();
   if (step->kind == StepKind::kReceiver) gnss.set_displaced(filter_->state().x.t_us);
   predictor_stale_ = true;
@@ -560,7 +561,7 @@ void Navigation::serialise(Archive& a) {
       a, abandoned_, [] { return SE3(); }, [&](SE3& T) { a(T.q.coeffs(), T.p); });
   a(phase_, predictor_stale_, lag_us_, last_step_us_, last_wheel_us_, wheels_at_us_, last_magnetic_us_, last_fix_us_,
     last_fix_.latitude, last_fix_.longitude, last_fix_.height, reset_counter_, reset_delta_.p, reset_delta_.q.coeffs(),
-    bad_imu_, gaps_, steps_, backwards_since_us_, start_agreed_, started_at_, local_);
+    bad_imu_, gaps_, steps_, arm_contradicted_, backwards_since_us_, start_agreed_, started_at_, local_);
   for (int64_t& t : used_at_us_) a(t);
 }
 

@@ -160,6 +160,7 @@ class Navigation {
   int reset_counter_ = 0;
   SE3 reset_delta_;
   int64_t bad_imu_ = 0, gaps_ = 0, steps_ = 0;
+  bool arm_contradicted_ = false;                         ///< the antenna is not where the calibration says
   int64_t backwards_since_us_ = 0;                        ///< faster than a car goes in reverse
   bool start_agreed_ = true;                              ///< fixes have, over some way
   Eigen::Vector3d started_at_ = Eigen::Vector3d::Zero();  ///< m, level

@@ -1,4 +1,6 @@
 // What is published: the predicted pose with its validity, and the status in words.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -90,6 +92,10 @@ NavigationStatus Navigation::status() const {
   s.gnss_reason = screen_.reason();
   if (s.gnss_reason.empty() && aiding_.gnss_position().height_displaced()) s.gnss_reason = kHeightContradicts;
   if (s.gnss_reason.empty() && aiding_.gnss_position().displaced()) s.gnss_reason = kDisplaced;
+  if (s.gnss_reason.empty() && arm_contradicted_ && filter() != nullptr) {
+    const Eigen::Vector3d off = filter()->state().x.p_imu_antenna - config_.facts.p_imu_antenna;
+    s.gnss_reason = fmt::format("the antenna is {:.1f} m from where the calibration has it", off.norm());
+  }
   s.bad_imu_samples = bad_imu_;
   s.imu_gaps = gaps_;
   s.wheel_scale_steps = steps_ + aiding_.wheel_speed().scale_steps();

@@ -11,6 +11,7 @@ constexpr int64_t kApart_us = 1'000'000;  // between two moments
 constexpr double kMostOfIt = 0.5;         // of what the innovations have too much, at least, is the step's
 constexpr double kLeastEvidence = 3.0;    // measurements; fewer are outliers
 constexpr double kMemory = 16.0;          // s, as far back as a step is looked for
+constexpr double kStartMemory = 120.0;    // s, of the evidence on what was wrong from the start
 constexpr double kBeyondOthers = 3.0;     // by which the logarithm of the odds exceeds that of every other kind
 
 struct Block {
@@ -18,17 +19,21 @@ struct Block {
   int first, size;
   /// Minus the logarithm of how often it steps, against the receiver (assumed): that is displaced once an hour, wheels
   /// change or a clock is set once in seven, and an imu's bias, which temperature moves over minutes, hardly ever steps.
+  /// One car in twenty has its antenna elsewhere.
   double rarity;
 };
-constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
-                                Block{StepKind::kImu, 1, 6, 7.0},
-                                Block{StepKind::kReceiver, 7, 6, 0.0},
-                                Block{StepKind::kReceiver, 10, 3, 0.0},  // dragged off from where it was: nothing jumps
-                                Block{StepKind::kImuClock, 13, 1, 2.0},
-                                Block{StepKind::kReceiverClock, 14, 1, 2.0},
-                                Block{StepKind::kWheelClock, 15, 1, 2.0}};
 constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10, kImuClock = 13, kReceiverClock = 14,
-              kWheelClock = 15;  // columns
+              kWheelClock = 15;                      // columns
+constexpr int kAntennaPlace = StepDetector::kWidth;  // the columns of the start stand behind those of a moment here
+constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
+                                Block{StepKind::kImu, kBiases, 6, 7.0},
+                                Block{StepKind::kReceiver, kDisplacement, 6, 0.0},
+                                Block{StepKind::kReceiver, kDrag, 3, 0.0},  // from where it was: nothing jumps
+                                Block{StepKind::kImuClock, kImuClock, 1, 2.0},
+                                Block{StepKind::kReceiverClock, kReceiverClock, 1, 2.0},
+                                Block{StepKind::kWheelClock, kWheelClock, 1, 2.0},
+                                Block{StepKind::kLeverArm, kAntennaPlace, StepDetector::kAntennaSize, 3.0}};
+constexpr int column_of(int at) { return at < StepDetector::kWidth ? at : at - StepDetector::kWidth; }
 
 /// A step of normal prior given the evidence: mean, covariance, and the logarithm of the Bayes factor.
 struct Posterior {
@@ -54,7 +59,7 @@ struct Posterior {
 
 void StepDetector::begin(State& state, const BodyMotion& motion) {
   if (state.carried().cols() != kColumns) state.carry(kColumns);
-  for (int m = 0; m < kMoments; ++m) begin(state, motion, m);
+  for (int m = 0; m <= kMoments; ++m) begin(state, motion, m);
   next_us_ = 0;
   usual_ = 1.0;
   fresh_ = false;
@@ -66,7 +71,12 @@ void StepDetector::begin(State& state, const BodyMotion& motion) {
 void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
   auto columns = state.carried().middleCols(first(moment), width(moment));
   columns.setZero();
-  columns(kWheelScale, 0) = 1.0;
+  if (moment == kStart) {  // positions were taken from that antenna, and so are the estimate's
+    columns.middleRows<3>(kAntenna).setIdentity();
+    columns.middleRows<3>(kPos) = -state.x.R();
+  } else {
+    columns(kWheelScale, 0) = 1.0;
+  }
   if (moment < kRecent) {
     columns.block<6, 6>(kGyroBias, kBiases).setIdentity();
     columns.block<3, 3>(kGnssBias, kDisplacement).setIdentity();
@@ -110,6 +120,10 @@ void StepDetector::move(State& state, const Eigen::Matrix<double, 9, kInertialSi
       errors(kGnssBias + i, first(m) + kDrag + i) += age_(m) + T - d * age_(m);
     }
   age_.array() += T;
+  const double kept = std::exp(-T / kStartMemory);
+  information_[kStart] *= kept;
+  sum_.col(kStart) *= kept;
+  squares_(kStart) *= kept;
 }
 
 StepDetector::Rows StepDetector::explained(const State& state, const Eigen::Ref<const Eigen::MatrixXd>& H,
@@ -128,7 +142,7 @@ void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G,
   // Robust weight, as of Huber's estimator: single outliers decide nothing, those that agree with each other do.
   const double square = whitened.squaredNorm(), rows = static_cast<double>(whitened.size());
   const double weight = std::min(1.0, kMostSquare * rows / square);
-  for (int m = 0; m < kMoments; ++m) {
+  for (int m = 0; m <= kMoments; ++m) {
     const int n = width(m);
     const auto g = G.middleCols(first(m), n);
     information_[static_cast<size_t>(m)].topLeftCorner(n, n) += weight * g.transpose().lazyProduct(g);
@@ -139,13 +153,18 @@ void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G,
   fresh_ = true;
 }
 
+bool StepDetector::carries(int moment, int at, int size) const {
+  return at < kWidth ? moment < kStart && at + size <= width(moment) : moment == kStart;
+}
+
 StepDetector::Fit StepDetector::best_of(int at, int size) const {
   const double usual = std::max(1.0, usual_);
+  const int column = column_of(at);
   Fit best;
-  for (int m = 0; m < kMoments; ++m) {
-    if (count_(m) < kLeastEvidence || at + size > width(m)) continue;
-    const Posterior fit(information_[static_cast<size_t>(m)].block(at, at, size, size) / usual,
-                        sum_.col(m).segment(at, size) / usual, typical_.segment(at, size));
+  for (int m = 0; m <= kMoments; ++m) {
+    if (count_(m) < kLeastEvidence || !carries(m, at, size)) continue;
+    const Posterior fit(information_[static_cast<size_t>(m)].block(column, column, size, size) / usual,
+                        sum_.col(m).segment(column, size) / usual, typical_.segment(at, size));
     if (fit.explained * usual < kMostOfIt * squares_(m)) continue;
     if (fit.log_odds > best.log_odds) best = {m, fit.log_odds};
   }
@@ -169,9 +188,10 @@ std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool 
   const auto [kind, at, size, rarity] = kBlocks[best];
   const int m = fits[best].moment;
   const double usual = std::max(1.0, usual_);
-  const Posterior fit(information_[static_cast<size_t>(m)].block(at, at, size, size) / usual,
-                      sum_.col(m).segment(at, size) / usual, typical_.segment(at, size));
-  return Step{kind, fit.log_odds - rarity, first(m) + at, fit.mean, fit.cov};
+  const int column = column_of(at);
+  const Posterior fit(information_[static_cast<size_t>(m)].block(column, column, size, size) / usual,
+                      sum_.col(m).segment(column, size) / usual, typical_.segment(at, size));
+  return Step{kind, fit.log_odds - rarity, first(m) + column, fit.mean, fit.cov};
 }
 
 std::optional<StepDetector::Doubt> StepDetector::doubted(const Step& step, int64_t t_us) const {

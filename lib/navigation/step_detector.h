@@ -22,21 +22,25 @@ enum class StepKind {
   kImuClock,
   kReceiverClock,
   kWheelClock,
+  kLeverArm,  ///< no step: the antenna has never been where the calibration says
 };
 
 class StepDetector {
  public:
   static constexpr int kMoments = 8;
-  /// Of these moments all kinds are carried, of the older ones the wheels' scale alone.
+  /// Of these moments all kinds are carried that jump, of the older ones the wheels' scale alone.
   static constexpr int kRecent = 4;
+  /// The moment from which on the filter watches: the antenna's place, which was wrong from the start if it is.
+  static constexpr int kStart = kMoments;
+  static constexpr int kAntennaSize = 3;
   /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate, three clocks.
   static constexpr int kWidth = 16;
-  static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent;
-  static constexpr int width(int moment) { return moment < kRecent ? kWidth : 1; }
+  static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent + kAntennaSize;
+  static constexpr int width(int moment) { return moment < kRecent ? kWidth : moment < kStart ? 1 : kAntennaSize; }
   static constexpr int first(int moment) {
     return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
   }
-  using Sizes = Eigen::Matrix<double, kWidth, 1>;
+  using Sizes = Eigen::Matrix<double, kWidth + kAntennaSize, 1>;
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
   using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
@@ -48,7 +52,7 @@ class StepDetector {
     Small cov;
   };
 
-  /// `typical`: standard deviations of steps, in the order of the columns.
+  /// `typical`: standard deviations of steps, in the order of a moment's columns; then those of the antenna's place.
   explicit StepDetector(const Sizes& typical) : typical_(typical) {}
 
   /// Watches from now on.
@@ -117,6 +121,7 @@ class StepDetector {
   };
   void begin(State& state, const BodyMotion& motion, int moment);
   [[nodiscard]] Fit best_of(int at, int size) const;
+  [[nodiscard]] bool carries(int moment, int at, int size) const;
   [[nodiscard]] bool clock_stepped_lately(int64_t t_us) const;
 
   Sizes typical_;
@@ -127,11 +132,14 @@ class StepDetector {
   double clock_step_ = 0.0;    ///< s, of the receiver's clock, as of doubted()
   int64_t clock_step_us_ = 0;  ///< of the last of them; 0: none
   double usual_ = 1.0;         ///< mean normalised square: measurements may be noisier than they claim
-  std::array<Square, kMoments> information_{Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero(),
-                                            Square::Zero(), Square::Zero(), Square::Zero(), Square::Zero()};
-  Eigen::Matrix<double, kWidth, kMoments> sum_ = Eigen::Matrix<double, kWidth, kMoments>::Zero();
+  std::array<Square, kMoments + 1> information_ = [] {
+    std::array<Square, kMoments + 1> zero;
+    zero.fill(Square::Zero());
+    return zero;
+  }();
+  Eigen::Matrix<double, kWidth, kMoments + 1> sum_ = Eigen::Matrix<double, kWidth, kMoments + 1>::Zero();
   /// By moment: s since; of the innovations beyond their number; evidence.
-  using ByMoment = Eigen::Matrix<double, kMoments, 1>;
+  using ByMoment = Eigen::Matrix<double, kMoments + 1, 1>;
   ByMoment age_ = ByMoment::Zero(), squares_ = ByMoment::Zero(), count_ = ByMoment::Zero();
 };
 

@@ -92,7 +92,7 @@ void HeadingHypotheses::start(const Filter& unsure) {
   known.state().release();
   Filter filter(config_, known.earth(), false);
   filter.adopt_without_camera(known);
-  filter.consider(kPositionLatency, 4);
+  filter.consider({kPositionLatency, 4});
   const int64_t now_us = filter.state().x.t_us;
   (void)filter.fuse(AidingSource::kNonholonomic, now_us, road_level(filter.state(), config_.car.tilt_std),
                     Gates::open().nis[2]);
@@ -133,7 +133,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   log_weights_.push_back(log_weight);
   Filter& filter = filters_.back();
   // Delays show through velocity and acceleration, whose direction is not known yet.
-  filter.consider(kPositionLatency, 4);
+  filter.consider({kPositionLatency, 4});
   filter.initialise(x, sigmas);
   if (s.return_std.x() > 0.0) filter.begin_return(s.return_std);
   // Using what the mean came from as measurements gives every correlation: tilt with accelerometer bias, position with

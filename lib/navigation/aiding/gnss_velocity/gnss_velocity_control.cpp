@@ -50,10 +50,7 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
   const double factor = scale_.variance_factor();
   const Eigen::Vector3d left = kSmoothing * filter.motion().acceleration;
   Measurement<3> m = measurement(filter, velocity, factor * (1.0 - like.share));
-  // A smoothed velocity looks like an antenna elsewhere: the antenna's place is noise here, and not estimated.
-  const Eigen::Matrix3d by_antenna = m.H.middleCols<3>(kAntenna);
-  m.R += by_antenna * filter.state().P().block<3, 3>(kAntenna, kAntenna) * by_antenna.transpose();
-  m.H.middleCols<3>(kAntenna).setZero();
+  m.considered = {kAntenna, 3};  // a smoothed velocity looks like an antenna elsewhere
   const AidingRecord r = filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
   if (r.status != AidingStatus::kAccepted || !lasting_) return r;
   filter.gnss_bias().velocity_time = 1.0 / like.rate;
