@@ -18,9 +18,11 @@ constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
 // How long a receiver takes to settle after it has lost all signals is nobody's promise: its loops pull in within a
 // second, its smoothing of codes by carriers (Hatch 1982) and its own filter within some. Prior: 0.75 to 8 s at one
 // standard deviation, and ten seconds later it may be another by a factor of 2.6.
-constexpr double kFadeTime = 2.5;    // s
-constexpr double kFadeSpread = 1.2;  // of the logarithm
-constexpr double kFadeWalk = 0.3;    // of the logarithm, 1/sqrt(s)
+constexpr double kFadeTime = 2.5;        // s
+constexpr double kFadeSpread = 1.2;      // of the logarithm
+constexpr double kFadeWalk = 0.3;        // of the logarithm, 1/sqrt(s)
+constexpr double kEarthRate = 7.292e-5;  // rad/s (WGS84)
+constexpr double kHeadingTime = 30.0;    // s, in which a road turns by a radian
 
 constexpr int kMostConsidered = 8;  // states: the receiver's and the imu's clocks, an antenna
 
@@ -124,6 +126,11 @@ Filter::Diagonal Filter::diagonal(double T) const {
   d.noise.segment<3>(kGyroBias) = walk * square(std::min(v.gyro_bias_std, p.gyro_drift_max)) * v.measured_rates();
   d.noise.segment<3>(kAccelBias).setConstant(walk * square(std::min(v.accel_bias_std, p.accel_drift_max)));
   d.noise.segment<6>(kGyroScale).setConstant(walk * square(v.scale_std));
+  if (!earth_.anchored() && v.has_imu) {  // (N.2.10): where nobody knows the Earth's rate, biases hold it
+    const double turned = 2.0 * T / kHeadingTime, coriolis = 2.0 * kEarthRate * state_.x.nav.velocity.norm();
+    d.noise.segment<3>(kGyroBias).array() += turned * square(kEarthRate);
+    d.noise.segment<3>(kAccelBias).array() += turned * square(coriolis);
+  }
   // What the calibration calls exact stays put.
   if (v.wheel_scale_std > 0.0) d.noise(kWheelScale) = square(p.wheel_scale_walk) * T;
   for (int i = 0; i < 2; ++i)
