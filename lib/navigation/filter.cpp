@@ -231,6 +231,15 @@ Eigen::Matrix<double, Rows, Rows> Filter::innovation_covariance(const Measuremen
 }
 
 template <int Rows>
+Eigen::Matrix<double, Rows, 1> Filter::residual(const Measurement<Rows>& m) const {
+  Eigen::Matrix<double, Rows, 1> r = m.residual;
+  if (!state_.held()) return r;
+  for (int k = 0; k < kWithoutCamera; ++k)
+    for (int i = 0; i < Rows; ++i) r(i) -= m.H(i, k) * state_.expected()(k);
+  return r;
+}
+
+template <int Rows>
 void Filter::reject(const Measurement<Rows>& m) {
   const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
   if (innovation.usable) steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened);
@@ -238,7 +247,7 @@ void Filter::reject(const Measurement<Rows>& m) {
 
 template <int Rows>
 AidingRecord Filter::judge(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) const {
-  const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
+  const Innovation<Rows> innovation(residual(m), innovation_covariance(m));
   AidingRecord r = record_of(source, AidingStatus::kBadInput, t_us);
   r.dof = Rows;
   r.nis = innovation.nis;
@@ -262,7 +271,7 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
       if (m.H(r, k) != 0.0) Y.col(r) += m.H(r, k) * P.col(k).head(n);
   Eigen::Matrix<double, Rows, Rows> S = m.H.lazyProduct(Y.template topRows<kWithoutCamera>()) + m.R;
   S.diagonal().array() += m.repeated;
-  const Innovation<Rows> innovation(m.residual, 0.5 * (S + S.transpose()));
+  const Innovation<Rows> innovation(residual(m), 0.5 * (S + S.transpose()));
   if (!innovation.usable) return;
   for (int i = 0; i < Rows; ++i) {  // Y L^-T, (N.3.2)
     for (int k = 0; k < i; ++k) Y.col(i) -= innovation.L(i, k) * Y.col(k);
@@ -285,6 +294,7 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
 
 template <int Rows>
 AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
+  if (state_.held()) flush();
   const AidingRecord record = judge(source, t_us, m, gate);
   if (record.status == AidingStatus::kGated) reject(m);
   if (record.status != AidingStatus::kAccepted) return record;

@@ -120,6 +120,9 @@ class Filter {
   /// H against the errors at the covariance's epoch.
   template <int Rows>
   [[nodiscard]] Eigen::Matrix<double, Rows, kWithoutCamera> at_epoch(const Measurement<Rows>& m) const;
+  /// Less what the errors are expected to be while the means are held, the covariance at the epoch.
+  template <int Rows>
+  [[nodiscard]] Eigen::Matrix<double, Rows, 1> residual(const Measurement<Rows>& m) const;
   template <int Rows>
   void apply(const Measurement<Rows>& m, bool evidence);
 

@@ -205,6 +205,7 @@ void Navigation::step(const ImuSample& imu) {
   const double dt = last_step_us_ == 0 ? 0.0 : seconds_between(last_step_us_, imu.t_us);
   last_step_us_ = imu.t_us;
   alignment_.see_first_sample(imu.t_us);
+  if (camera_ && phase_ == Phase::kWaiting) moving_start_.add(imu, config_.process.max_gap);
   if (dt <= 0.0) return;
   const bool gap = dt > config_.process.max_gap;
   bool block_done = false;
@@ -225,12 +226,12 @@ void Navigation::step(const ImuSample& imu) {
     filter_->predict(imu, dt, noise_over(imu.t_us, dt));
     if (turned) return ask_heading();
     step_aligned(imu, block_done);
-    if (heads_backwards() || started_wrong()) return align_again();
+    if (heads_backwards() || started_wrong() || lost_locally()) return align_again();
     if (block_done) lag_us_ = lag_of(filter_->longest_age(wheels_at_us_ != 0));
   } else if (phase_ == Phase::kHeading) {
     step_heading(imu, dt, block_done);
   } else if (without_gnss()) {
-    if (block_done && !imu_noise_.frozen()) try_local_start(imu.t_us);
+    if ((local_start_.due(imu.t_us) || block_done) && !imu_noise_.frozen()) try_local_start(imu.t_us, block_done);
   } else {
     phase_ = alignment_.has_fix() ? Phase::kLevelling : Phase::kWaiting;
     if (!block_done || imu_noise_.frozen()) return;
@@ -240,7 +241,7 @@ void Navigation::step(const ImuSample& imu) {
       back = aiding_.gnss_position().return_std(*alignment_.fix());
     }
     if (!alignment_.try_start(imu.t_us, standstill_, anchor_, bias, back)) {
-      if (may_start_locally(imu.t_us)) try_local_start(imu.t_us);
+      if (may_start_locally(imu.t_us)) try_local_start(imu.t_us, true);
       return;
     }
     if (!alignment_.parked()) aiding_.gnss_position().started_with(*alignment_.fix());
@@ -280,18 +281,40 @@ void Navigation::step_heading(const ImuSample& imu, double dt, bool block_done) 
   if (block_done && all.confirmed()) end_alignment();
 }
 
-void Navigation::try_local_start(int64_t t_us) {
+void Navigation::try_local_start(int64_t t_us, bool block_done) {
   const std::optional<StartState> start =
-      local_start_.attempt(config_, t_us, standstill_, camera_ ? &*camera_ : nullptr);
+      local_start_.attempt(config_, t_us, standstill_, camera_ ? &*camera_ : nullptr, block_done);
+  if (!start) {
+    if (block_done) try_moving_start(t_us);
+    return;
+  }
+  begin_locally(t_us, start->standing ? AidingSource::kZeroVelocity : AidingSource::kWheelSpeed);
+  alignment_.hypotheses().start(inertial::Earth(), *start);
+  end_alignment();
+}
+
+void Navigation::try_moving_start(int64_t t_us) {
+  if (!camera_) return;
+  Mean x;
+  x.camera_offset = config_.facts.camera->offset;
+  const std::optional<CameraControl::Flow> flow = camera_->flow(t_us, x);
+  if (!flow || flow->still()) return;
+  std::optional<MovingStart::Started> start = moving_start_.attempt(config_, *camera_, imu_noise_.noise());
   if (!start) return;
+  begin_locally(t_us, AidingSource::kCameraTracks);
+  filter_.emplace(std::move(start->filter));
+  camera_.emplace(std::move(start->camera));
+  begin_running();
+}
+
+/// What it starts by aids it.
+void Navigation::begin_locally(int64_t t_us, AidingSource by) {
   forget_before(t_us + 1);
   local_ = true;
   tie_.restart();
-  // What it starts by aids it.
-  used_at_us_[static_cast<size_t>(start->standing ? AidingSource::kZeroVelocity : AidingSource::kWheelSpeed)] = t_us;
-  alignment_.hypotheses().start(inertial::Earth(), *start);
+  moving_start_.clear();
+  used_at_us_[static_cast<size_t>(by)] = t_us;
   predictor_.emplace(inertial::Earth());
-  end_alignment();
 }
 
 /// Where no fix has ever come: one that has was of a place in enu, which a local frame would forget. A car that is at rest may
@@ -334,13 +357,18 @@ void Navigation::end_alignment() {
     filter_.emplace(config_, all.leader().earth(), true);
     filter_->adopt(all.leader(), *config_.facts.camera);
     camera_->restart();
+    if (local_) camera_->presume_fit();
     camera_->skip_before(last_step_us_, filter_->state().x);
   } else {
     filter_.emplace(all.leader());
     filter_->consider({});
   }
-  if (config_.aiding.step_detection) filter_->watch_for_steps();
   all.stop();
+  begin_running();
+}
+
+void Navigation::begin_running() {
+  if (config_.aiding.step_detection) filter_->watch_for_steps();
   phase_ = Phase::kDone;
   backwards_since_us_ = last_step_us_;
   start_agreed_ = !alignment_.remembers_heading();
@@ -416,6 +444,12 @@ bool Navigation::heads_backwards() {
 /// A remembered heading that no fix has agreed with over some way has no past to hold against a receiver that contradicts: it
 /// is that of a car that was turned while it was parked.
 bool Navigation::started_wrong() const { return !start_agreed_ && aiding_.gnss_position().displaced(); }
+
+/// Tracks contradict a local frame that nothing else holds: a new start tells more than waiting for the camera does.
+bool Navigation::lost_locally() const {
+  return local_ && camera_ && camera_->fitness() == CameraFitness::kUnfit &&
+         velocity_std(filter_->state()) > kTieVelocity;
+}
 
 bool Navigation::standing(const Filter& filter, bool block_done) const {
   if (!block_done) return false;
@@ -555,6 +589,7 @@ void Navigation::serialise(Archive& a) {
   car_.serialise(a);
   ring_.serialise(a);
   local_start_.serialise(a);
+  moving_start_.serialise(a);
   tie_.serialise(a);
   queue_.serialise(a);
   serialise_optional(

@@ -25,6 +25,7 @@
 #include "navigation/initialisation/alignment.h"
 #include "navigation/initialisation/frame_tie.h"
 #include "navigation/initialisation/local_start.h"
+#include "navigation/initialisation/moving_start.h"
 #include "navigation/motion/car_motion.h"
 #include "navigation/output_predictor.h"
 
@@ -105,12 +106,15 @@ class Navigation {
   void mend_steps();
   void align_again();
   void ask_heading();
-  void try_local_start(int64_t t_us);
+  void try_local_start(int64_t t_us, bool block_done);
+  void begin_locally(int64_t t_us, AidingSource by);
+  void try_moving_start(int64_t t_us);
   [[nodiscard]] bool may_start_locally(int64_t t_us) const;
   [[nodiscard]] bool gives_way_to_fixes(int64_t t_us) const;
   /// A measurement of a receiver in a local frame; true: the frame is enu now, and it can be used.
   bool tie_frame(const Queued& q);
   void end_alignment();
+  void begin_running();
   void note(AidingRecord record, int64_t id = 0);
   void forget_before(int64_t t_us);
   [[nodiscard]] inertial::ImuNoise noise_over(int64_t t_us, double dt) const;
@@ -118,6 +122,7 @@ class Navigation {
   [[nodiscard]] bool picture_still(const Mean& x) const;
   bool heads_backwards();
   [[nodiscard]] bool started_wrong() const;
+  [[nodiscard]] bool lost_locally() const;
   [[nodiscard]] bool usable() const;
   /// No GNSS is to be used: the frame stays local.
   [[nodiscard]] bool without_gnss() const {
@@ -143,6 +148,7 @@ class Navigation {
   MeasurementQueue queue_;
   Alignment alignment_;
   LocalStart local_start_;
+  MovingStart moving_start_;
   FrameTie tie_;
   std::optional<Geodetic> anchor_;
   std::optional<Geodetic> tie_anchor_;  ///< of the fixes that come in a local frame

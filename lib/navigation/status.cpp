@@ -15,7 +15,8 @@ constexpr char kNotTied[] = "a local frame, until fixes tie it";
 constexpr char kDisplaced[] = "GNSS positions contradict all else and are taken for displaced";
 constexpr char kHeightContradicts[] = "the height of GNSS contradicts and is taken for an error of the receiver";
 
-constexpr char kWaitsForRest[] = "rest, or a speed from the wheels";
+constexpr char kWaitsForRest[] =
+    "rest, a speed from the wheels, or pictures of a drive that speeds up, brakes or turns";
 constexpr double kInvalidVelocity = 2.0;  // m/s, sigma: without GNSS, more is no motion estimate
 
 const char* waiting_for(Phase phase, bool has_imu, bool has_fix) {

@@ -88,4 +88,11 @@ navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
   return v;
 }
 
+navigation::VehicleFacts vehicle_facts_without_gnss(const Calibration& calibration) {
+  navigation::VehicleFacts v = vehicle_facts(calibration);
+  v.has_receiver = false;
+  v.position_latency_std = v.velocity_latency_std = v.time_offset_std = 0.0;
+  return v;
+}
+
 }  // namespace roadfix

@@ -11,5 +11,7 @@ namespace roadfix {
 /// Nothing without a left camera whose lens and mounting are known.
 std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibration);
 navigation::VehicleFacts vehicle_facts(const Calibration& calibration);
+/// For an estimator that uses no receiver: the IMU's clock is the one that counts.
+navigation::VehicleFacts vehicle_facts_without_gnss(const Calibration& calibration);
 
 }  // namespace roadfix

@@ -15,11 +15,10 @@
 #include "bus/types/schema.h"
 #include "config/calibration.h"
 #include "config/config_error.h"
-#include "features/front_end.h"
+#include "features/picture_tracks.h"
 #include "geometry/frames.h"
-#include "msckf/camera_imu.h"
-#include "msckf/picture_tracks.h"
-#include "msckf/stamp_line.h"
+#include "navigation/aiding/camera/camera_imu.h"
+#include "navigation/aiding/camera/stamp_line.h"
 #include "roadfix/commands.h"
 #include "roadfix/common_options.h"
 #include "vo_tracker/camera_rig.h"
@@ -39,7 +38,7 @@ struct CalibrateOptions {
 
 struct CalibrationDrive {
   std::vector<ImuSample> imu;
-  std::vector<msckf::SeenFrame> frames;
+  std::vector<navigation::SeenPicture> frames;
 };
 
 /// The events of one channel, checked, oldest first.
@@ -64,11 +63,15 @@ CalibrationDrive read_drive(const CalibrateOptions& options, const Calibration& 
     if (drive.imu.empty() || m.utime > drive.imu.back().t_us) drive.imu.push_back(imu_sample(m));
   });
   const CameraCalibration& left = *calibration.sensors.camera_left;
-  msckf::StampLine line(left.rate.value_or(0.0), left.stamp_jitter.value_or(0.0));
-  PictureTracks tracks(camera_rig(calibration).left, std::nullopt, make_front_end(FrontEndConfig{}));
+  navigation::StampLine line(left.rate.value_or(0.0), left.stamp_jitter.value_or(0.0));
+  const CameraIntrinsics lens = camera_rig(calibration).left;
+  const Camera camera(lens);
+  PictureTracks tracks(lens, std::nullopt, make_front_end(FrontEndConfig{}));
   each<image_t>(reader, "CAMERA_LEFT", [&](const image_t& m) {
     const cv::Mat picture = grey_image(m);
-    if (!picture.empty()) drive.frames.push_back(tracks.track(line.on_time(m.utime), picture, {}, std::nullopt));
+    if (picture.empty()) return;
+    tracks.track(line.on_time(m.utime), picture, {}, std::nullopt);
+    drive.frames.push_back(navigation::seen_picture(tracks.picture(), camera, nullptr));
   });
   if (drive.imu.empty() || drive.frames.empty())
     throw std::runtime_error(options.log.string() + ": needs the channels IMU and CAMERA_LEFT");
@@ -80,7 +83,8 @@ void calibrate(const CalibrateOptions& options) {
   Calibration calibration = load_calibration(options.vehicle);
   const SE3 before = camera_rig(calibration).T_vehicle_left;  // names what is missing
   const CalibrationDrive drive = read_drive(options, calibration);
-  const auto found = msckf::calibrate_camera_imu(drive.frames, drive.imu, kLargestOffset, Eigen::Matrix3d::Identity());
+  const auto found =
+      navigation::calibrate_camera_imu(drive.frames, drive.imu, kLargestOffset, Eigen::Matrix3d::Identity());
   if (!found) {
     throw std::runtime_error(options.log.string() +
                              ": the drive does not tell; it takes a minute with turns and straight pieces by daylight");

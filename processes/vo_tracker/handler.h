@@ -1,5 +1,5 @@
 /// POSE_VO, VO_STATUS and VO_FEATURES from the cameras and other sensors: translates between messages and an estimator,
-/// lib/slam in mode `keyframe`, lib/msckf in mode `msckf`.
+/// lib/slam in mode `keyframe`, lib/navigation without GNSS in mode `filter`.
 #pragma once
 
 #include <filesystem>
@@ -9,33 +9,33 @@
 #include "config/calibration.h"
 #include "features/front_end.h"
 #include "features/stereo_matcher.h"
-#include "msckf/config.h"
+#include "navigation/config.h"
 #include "slam/config.h"
 
 namespace roadfix {
 
-/// kAuto: selected from the sensors by mode_for().
-enum class VoMode { kAuto, kKeyframe, kMsckf };
+/// kFilter: the navigation filter of cameras, IMU and wheels alone.
+enum class VoMode { kKeyframe, kFilter };
 
-/// Of mode `msckf`.
-struct MsckfVoConfig {
+/// Of mode `filter`.
+struct FilterVoConfig {
   FrontEndConfig front_end{.max_features = 200};
   StereoConfig stereo;
-  double publish_period = 0.02;  ///< s, of data time, between two poses
-  MsckfTuning tuning;
+  double publish_period = 0.02;             ///< s, of data time, between two poses
+  navigation::NavigationTuning navigation;  ///< sources of GNSS and the magnetic heading are never used
 };
 
 template <class Visitor>
-void visit(MsckfVoConfig& c, Visitor& v) {
+void visit(FilterVoConfig& c, Visitor& v) {
   v.group("front_end", c.front_end);
   v.group("stereo", c.stereo);
   v.number("publish_period_s", c.publish_period, 0.0, 10.0);
-  v.group("tuning", c.tuning);
+  v.group("navigation", c.navigation);
 }
 
 /// configs/VEHICLE/vo_tracker.yaml.
 struct VoTrackerConfig {
-  VoMode mode = VoMode::kAuto;
+  VoMode mode = VoMode::kKeyframe;
   int threads = 2;             ///< 2: bundle adjustment in parallel with the tracking; the results are the same
   bool filter_stamps = false;  ///< smooth the left camera's timestamps
   double stereo_gap = 0.005;   ///< s, maximum stamp difference of a stereo pair
@@ -44,25 +44,20 @@ struct VoTrackerConfig {
   std::string network_model;
   std::string superpoint_model;  ///< the key of 0.1; network_model takes precedence
   KeyframeTrackerConfig keyframe;
-  MsckfVoConfig msckf;
+  FilterVoConfig filter;
 };
 
 template <class Visitor>
 void visit(VoTrackerConfig& c, Visitor& v) {
-  v.choice("mode", c.mode, {{"auto", VoMode::kAuto}, {"keyframe", VoMode::kKeyframe}, {"msckf", VoMode::kMsckf}});
+  v.choice("mode", c.mode, {{"keyframe", VoMode::kKeyframe}, {"filter", VoMode::kFilter}});
   v.integer("threads", c.threads, 1, 2);
   v.boolean("filter_stamps", c.filter_stamps);
   v.number("stereo_gap_s", c.stereo_gap, 0.0, 0.1);
   v.text("network_model", c.network_model);
   v.text("superpoint_model", c.superpoint_model);
   v.group("keyframe", c.keyframe);
-  v.group("msckf", c.msckf);
+  v.group("filter", c.filter);
 }
-
-/// The automatic mode. One camera and an IMU without wheels: msckf, whose scale comes from the IMU; the keyframe
-/// tracker would take it from the INS, which depends on the vision pose itself. Stereo and an IMU without wheels on a
-/// rig of unknown orientation (EuRoC): msckf too, which levels itself by gravity. Otherwise keyframe.
-VoMode mode_for(const Calibration& calibration);
 
 /// The bytes of the network that the configuration names; empty where it names none. ConfigError where the file cannot be read.
 std::vector<uint8_t> network_weights(const std::filesystem::path& vehicle_dir, const VoTrackerConfig& config);

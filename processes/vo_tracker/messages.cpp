@@ -115,6 +115,38 @@ vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared,
   return m;
 }
 
+vo_status_t filter_status(const navigation::NavigationOutput& output, const navigation::Navigation& filter,
+                          bool two_eyes) {
+  vo_status_t m{};
+  m.mode = vo_status_t::MODE_MSCKF;
+  const Odometry& o = output.odometry;
+  m.reason = output.reason;
+  if (o.validity == Validity::kInvalid) {
+    m.state = output.reset_counter > 0 || filter.filter() != nullptr ? vo_status_t::STATE_LOST
+                                                                     : vo_status_t::STATE_INITIALISING;
+  } else {
+    m.state = o.validity == Validity::kValid ? vo_status_t::STATE_GOOD : vo_status_t::STATE_WEAK;
+    const auto wheels = 1U << static_cast<unsigned>(navigation::AidingSource::kWheelSpeed);
+    const bool by_wheels = (static_cast<unsigned>(filter.status().aided_by) & wheels) != 0;
+    m.scale_source = by_wheels  ? vo_status_t::SCALE_FROM_WHEELS
+                     : two_eyes ? vo_status_t::SCALE_FROM_STEREO
+                                : vo_status_t::SCALE_FROM_IMU;
+    const double speed = o.velocity.norm();
+    m.scale_std = speed > 0.1 ? std::sqrt(o.cov_velocity(0, 0)) / speed : 0.0;
+  }
+  if (const navigation::CameraControl* camera = filter.camera()) {
+    const navigation::TrackCounts& counts = camera->counts();
+    m.num_matches = camera->num_seen();
+    m.num_inliers = counts.used;
+    m.inlier_ratio = counts.tried() > 0 ? static_cast<double>(counts.used) / counts.tried() : 1.0;
+  }
+  if (const navigation::Filter* f = filter.filter(); f != nullptr && f->state().has_camera()) {
+    m.time_offset_s = -f->state().x.camera_offset;
+    m.time_offset_std_s = std::sqrt(f->state().P()(navigation::kCameraOffset, navigation::kCameraOffset));
+  }
+  return m;
+}
+
 vo_features2_t vo_features(const TrackedFrame& frame) {
   constexpr TrackNoise noise;
   vo_features2_t m{};

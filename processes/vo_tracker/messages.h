@@ -7,6 +7,7 @@
 #include <roadfix/vo_status_t.hpp>
 
 #include "config/calibration.h"
+#include "navigation/navigation.h"
 #include "slam/keyframe_tracker.h"
 
 namespace roadfix {
@@ -19,6 +20,9 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
 const char* name_of(FrontEndKind kind);
 
 vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end);
+/// Of mode `filter`.
+vo_status_t filter_status(const navigation::NavigationOutput& output, const navigation::Navigation& filter,
+                          bool two_eyes);
 vo_features2_t vo_features(const TrackedFrame& frame);
 
 void set_reset(int counter, const SE3& delta, pose_t& message);

@@ -48,9 +48,7 @@ def cpu_ms(runs, *flags):
 
 def malaga(runs):
     """Figures of POSE_VO on the drive, mono without aid, after Sim3 and the receiver's latency."""
-    tuning = runs.folder("keyframe_tuning")
-    (tuning / "vo_tracker.yaml").write_text("mode: keyframe\n")  # left open, these sensors get msckf
-    return runs.scored("POSE_VO", "vo_tracker", MALAGA, config=tuning, align=("POSE_VO", "sim3"), fit_latency=True)
+    return runs.scored("POSE_VO", "vo_tracker", MALAGA, align=("POSE_VO", "sim3"), fit_latency=True)
 
 
 def malaga_tracked(runs):

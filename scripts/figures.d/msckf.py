@@ -1,4 +1,4 @@
-"""msckf: vo_tracker in mode msckf on the drives of ../shared/data, and its filter on simulated drives (tracks without
+"""msckf: vo_tracker in mode filter (the navigation filter without GNSS) on the drives of ../shared/data, and its filter on simulated drives (tracks without
 pixels, build/release/bin/msckf_drives). CPU: build/release/bin/msckf_cost."""
 import bisect
 import csv
@@ -17,8 +17,8 @@ EARTH_RADIUS_M = 6378137.0
 LATENCIES_S = [0.05 * i for i in range(0, 31)]  # by which fixes are older than their stamps
 
 
-def mode_msckf(vehicle):
-    (vehicle / "vo_tracker.yaml").write_text("mode: msckf\n")
+def mode_filter(vehicle):
+    (vehicle / "vo_tracker.yaml").write_text("mode: filter\n")
 
 
 def replayed(runs, drive):
@@ -26,7 +26,7 @@ def replayed(runs, drive):
 
     def run():
         log, vehicle = runs.imported(drive)
-        mode_msckf(vehicle)
+        mode_filter(vehicle)
         if drive in UNCALIBRATED:
             runs.roadfix("calibrate", "camera-imu", log, "--config", vehicle)
         out = runs.folder(drive, "msckf") / "out.lcm"

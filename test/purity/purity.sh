@@ -3,8 +3,8 @@
 #   purity.sh ROOT
 set -uo pipefail
 cd "$1" || exit 2
-order=(geometry statistics geodesy samples stream inertial vehicle wheel camera features navigation slam msckf fusion papers integrity health evaluation simulation)
-estimators=' wheel slam msckf navigation fusion '
+order=(geometry statistics geodesy samples stream inertial vehicle wheel camera features navigation slam fusion papers integrity health evaluation simulation)
+estimators=' wheel slam navigation fusion '
 breaches=0
 
 # report WHY: counts and prints the lines on standard input, comments left out.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# A recording of ../shared/data through vo_tracker in mode msckf: after the first valid pose none is lost. With a speed
-# limit that the drive breaks after that (if one is given), some are.
-#   followed.sh ROADFIX DRIVE [LIMIT in m/s]
+# A recording of ../shared/data through vo_tracker in mode filter: after the first valid pose none is lost. Where
+# a time between two updates is called coasting that some exceed (if one is given), some are.
+#   followed.sh ROADFIX DRIVE [LIMIT in s]
 set -euo pipefail
 roadfix=$1; drive=$(cd "$(dirname "$0")/../../.." && pwd)/shared/data/$2; limit=${3:-}
 [[ -d $drive ]] || { echo "skipped: no $drive"; exit 0; }
@@ -17,9 +17,9 @@ counts() {
   awk -F, 'NR == 1 { next } $NF == "valid" { begun = 1; ++valid } begun && $NF != "valid" { ++lost }
     END { print valid + 0, lost + 0 }' "$folder/$2.csv"
 }
-read -r valid lost < <(counts "mode: msckf" all)
+read -r valid lost < <(counts "mode: filter" all)
 echo "$2: $valid valid poses, $lost lost"
 [[ $valid -gt 200 && $lost -eq 0 ]] || exit 1
 [[ -n $limit ]] || exit 0
-read -r valid lost < <(counts "{mode: msckf, msckf: {tuning: {trust: {max_speed_mps: $limit}}}}" limited)
+read -r valid lost < <(counts "{mode: filter, filter: {navigation: {start: {coasting_s: $limit}}}}" limited)
 [[ $lost -gt 0 ]] || { echo 'the count cannot fail'; exit 1; }

@@ -90,7 +90,7 @@ const std::vector<DriveMessage>& estimates() {
 std::unique_ptr<Stage> make_tracker(const Calibration& calibration, VoMode mode) {
   VoTrackerConfig config;
   config.mode = mode;
-  config.keyframe.front_end.max_features = config.msckf.front_end.max_features = 120;  // enough for small pictures
+  config.keyframe.front_end.max_features = config.filter.front_end.max_features = 120;  // enough for small pictures
   return make_vo_tracker(calibration, config);
 }
 
@@ -104,8 +104,8 @@ const std::vector<ShippedStage>& shipped_stages() {
       {"integrity", demo_calibration(), [](const Calibration& c) { return make_integrity(c, {}); }, estimates},
       {"vo_tracker, stereo", picture_car(true), [](const Calibration& c) { return make_tracker(c, VoMode::kKeyframe); },
        picture_drive},
-      {"vo_tracker, mode msckf", picture_car(false),
-       [](const Calibration& c) { return make_tracker(c, VoMode::kMsckf); }, picture_drive},
+      {"vo_tracker, mode filter", picture_car(false),
+       [](const Calibration& c) { return make_tracker(c, VoMode::kFilter); }, picture_drive},
       {"gnss_ins_ekf, with tracks", demo_calibration(), [](const Calibration& c) { return make_gnss_ins_ekf(c, {}); },
        demo_with_tracks},
   };

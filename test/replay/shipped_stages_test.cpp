@@ -84,7 +84,7 @@ TEST_CASE("200 orders of arrival within the lateness, half of them with duplicat
 TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: vo_tracker does") {
   require_orders_alike(shipped_stages()[4]);
 }
-TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: vo_tracker in mode msckf does") {
+TEST_CASE("200 orders of arrival within the lateness, half of them with duplicates: vo_tracker in mode filter does") {
   require_orders_alike(shipped_stages()[5]);
 }
 

@@ -14,10 +14,11 @@ namespace {
 
 constexpr int64_t kBegin_us = 1'700'000'000'000'000;
 constexpr double kImuStep_s = 0.005, kFrameStep_s = 0.05;
-constexpr double kGravity = 9.81;
+constexpr double kGravity = 9.80665;
 constexpr double kFocal = 458.0, kHalfWidth = 376.0, kHalfHeight = 240.0;  // px
-constexpr double kWall = 4.0, kFloor = -1.2, kCeiling = 3.0;               // m
-constexpr double kNearest = 0.3;                                           // m
+const Eigen::Vector2d kCentre(kHalfWidth, kHalfHeight);
+constexpr double kWall = 4.0, kFloor = -1.2, kCeiling = 3.0;  // m
+constexpr double kNearest = 0.3;                              // m
 constexpr int kPoints = 2500;
 constexpr size_t kSeen = 200;
 constexpr double kDies = 0.02;  // of the tracks, a picture
@@ -124,7 +125,7 @@ class Tracks {
  public:
   explicit Tracks(uint64_t seed) : points_(room(seed)), ids_(points_.size(), 0), pixels_(seed, 4), deaths_(seed, 5) {}
 
-  std::vector<msckf::SeenPoint> seen(const SE3& T_camera_room, double noise_px) {
+  std::vector<TrackSighting> seen(const SE3& T_camera_room, double noise_px) {
     std::vector<std::pair<int64_t, Eigen::Vector2d>> old;
     std::vector<size_t> fresh;
     for (size_t i = 0; i < points_.size(); ++i) {
@@ -142,10 +143,10 @@ class Tracks {
       old.emplace_back(ids_[i], *projected(T_camera_room * points_[i]));
     }
     std::ranges::sort(old, {}, [](const auto& track) { return track.first; });
-    std::vector<msckf::SeenPoint> out;
+    std::vector<TrackSighting> out;
     for (const auto& [id, z] : old) {
       const double u = pixels_.normal(), v = pixels_.normal();
-      out.push_back({id, z + noise_px / kFocal * Eigen::Vector2d(u, v), {}, kFocal});
+      out.push_back({id, kFocal * z + kCentre + noise_px * Eigen::Vector2d(u, v), {}, noise_px, 0.0, 0.0});
     }
     return out;
   }
@@ -179,19 +180,23 @@ Flight make_flight(const FlightConfig& config, uint64_t seed) {
   return out;
 }
 
-MsckfConfig filter_config(const FlightConfig& config) {
-  MsckfConfig c;
-  MsckfVehicle& v = c.vehicle;
-  v.gyro_noise = config.gyro_noise;
-  v.accel_noise = config.accel_noise;
+navigation::NavigationConfig filter_config(const FlightConfig& config) {
+  navigation::NavigationConfig c;
+  c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = c.sources.magnetic_heading = false;
+  navigation::VehicleFacts& v = c.facts;
+  v.imu = {config.gyro_noise, config.accel_noise};
   v.gyro_bias_std = config.gyro_bias_std;
   v.accel_bias_std = config.accel_bias_std;
-  v.gravity = kGravity;
-  v.T_imu_camera = T_imu_camera();
-  v.camera_rate = 1.0 / kFrameStep_s;
-  v.mounting_std = kPi;
-  v.axle_std = 1.0;
-  c.window.sigma_px = config.noise_px;
+  v.mounting_std.setConstant(kPi);
+  v.p_imu_axle_std.setConstant(1.0);
+  navigation::CameraFacts& camera = v.camera.emplace();
+  camera.left.width = static_cast<int>(2.0 * kHalfWidth);
+  camera.left.height = static_cast<int>(2.0 * kHalfHeight);
+  camera.left.fx = camera.left.fy = kFocal;
+  camera.left.cx = kCentre.x();
+  camera.left.cy = kCentre.y();
+  camera.T_imu_camera = T_imu_camera();
+  camera.rate = 1.0 / kFrameStep_s;
   return c;
 }
 

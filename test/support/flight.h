@@ -3,7 +3,9 @@
 /// ahead.
 #pragma once
 
-#include "msckf/msckf.h"
+#include "navigation/config.h"
+#include "samples/samples.h"
+#include "samples/track_picture.h"
 
 namespace roadfix::test {
 
@@ -18,13 +20,13 @@ struct FlightConfig {
 };
 
 struct Flight {
-  std::vector<ImuSample> imu;            ///< 200 Hz
-  std::vector<msckf::SeenFrame> frames;  ///< 20 Hz
-  std::vector<Odometry> truth;           ///< at each imu sample; frame: z up, origin where the imu begins
+  std::vector<ImuSample> imu;        ///< 200 Hz
+  std::vector<TrackPicture> frames;  ///< 20 Hz
+  std::vector<Odometry> truth;       ///< at each imu sample; frame: z up, origin where the imu begins
 };
 
 Flight make_flight(const FlightConfig& config, uint64_t seed);
 /// What the import of such a recording says of it: nobody knows which way is ahead.
-MsckfConfig filter_config(const FlightConfig& config);
+navigation::NavigationConfig filter_config(const FlightConfig& config);
 
 }  // namespace roadfix::test

@@ -76,58 +76,65 @@ VisualDrive make_drive(const VisualDriveConfig& config, uint64_t seed) {
     View view;
     view.t_s = 1e-6 * static_cast<double>(t);
     view.T_enu_camera = k.T_enu_vehicle * T_vehicle_camera();
-    msckf::SeenFrame frame;
+    TrackPicture frame;
     frame.t_us = config.scenario.start_utime + t -
                  std::llround(1e6 * (config.time_offset + config.stamp_jitter * jitter.normal()));
     int outliers = 0;
     for (const TrackObservation& o : tracks.observe(view)) {
-      msckf::SeenPoint point{o.id, *camera.unproject(o.left), {}, camera.focal()};
-      if (o.right) point.right = camera.unproject(*o.right);
-      frame.points.push_back(point);
+      const double noise = config.tracks.noise_px;  // white, of each eye
+      TrackSighting sighting{o.id, o.left, {}, noise, 0.0, std::sqrt(2.0) * noise};
+      if (config.stereo) sighting.right = o.right;
+      frame.tracks.push_back(sighting);
       outliers += o.is_outlier ? 1 : 0;
     }
-    out.outliers.push_back(frame.points.empty() ? 0.0 : outliers / static_cast<double>(frame.points.size()));
+    out.outliers.push_back(frame.tracks.empty() ? 0.0 : outliers / static_cast<double>(frame.tracks.size()));
     if (out.frames.empty() || frame.t_us > out.frames.back().t_us) out.frames.push_back(std::move(frame));
   }
   return out;
 }
 
-MsckfConfig filter_config(const VisualDriveConfig& config) {
-  MsckfConfig c;
+navigation::NavigationConfig filter_config(const VisualDriveConfig& config) {
+  navigation::NavigationConfig c;
+  c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = c.sources.magnetic_heading = false;
   const ScenarioConfig& s = config.scenario;
-  MsckfVehicle& v = c.vehicle;
-  v.gyro_noise = s.imu.gyro_noise_radps_per_rthz;
-  v.accel_noise = s.imu.accel_noise_mps2_per_rthz;
+  navigation::VehicleFacts& v = c.facts;
+  v.imu = {s.imu.gyro_noise_radps_per_rthz, s.imu.accel_noise_mps2_per_rthz};
   v.gyro_bias_std = s.imu.gyro_bias_std_radps;
   v.accel_bias_std = s.imu.accel_bias_std_mps2;
   v.scale_std = s.imu.gyro_scale_std;
   v.correlation_s = 1e6;
-  v.T_imu_camera = T_vehicle_camera();
-  if (config.stereo) v.T_left_right = SE3{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, 0.0}};
   v.wheel_scale_std = s.wheels.speed_scale_std;
-  v.wheel_noise = s.wheels.speed_noise_mps;
-  v.mounting_std = 1e-3;
-  c.window.sigma_px = config.tracks.noise_px;
+  v.wheels.speed_noise = s.wheels.speed_noise_mps;
+  v.mounting_std.setConstant(1e-3);
+  navigation::CameraFacts& camera = v.camera.emplace();
+  camera.left = lens();
+  camera.T_imu_camera = T_vehicle_camera();
+  if (config.stereo) {
+    camera.right = camera.left;
+    camera.T_left_right = SE3{Eigen::Quaterniond::Identity(), {kBaseline, 0.0, 0.0}};
+  }
   return c;
 }
 
 SE3 imu_place(const SimulatedDrive& drive) { return {drive.errors.q_vehicle_imu, drive.config.imu.position_m}; }
 
-void tell_place(const SimulatedDrive& drive, MsckfVehicle& vehicle) {
+void tell_place(const SimulatedDrive& drive, navigation::VehicleFacts& vehicle) {
   const SE3 T_imu_vehicle = imu_place(drive).inverse();
-  vehicle.T_imu_camera = T_imu_vehicle * T_vehicle_camera();
+  vehicle.camera->T_imu_camera = T_imu_vehicle * T_vehicle_camera();
   vehicle.p_imu_axle = T_imu_vehicle.p;
   const Eigen::Vector3d ahead = T_imu_vehicle.q * Eigen::Vector3d::UnitX();
   vehicle.mounting = log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), ahead)).tail<2>();
 }
 
-void run(Msckf& filter, const VisualDrive& drive, bool wheels, const std::function<void(const Msckf&)>& seen) {
+void run(navigation::Navigation& filter, const VisualDrive& drive, bool wheels,
+         const std::function<void(navigation::Navigation&)>& seen) {
   size_t frame = 0, wheel = 0;
   for (const ImuSample& imu : drive.drive.imu) {
     while (frame < drive.frames.size() && drive.frames[frame].t_us <= imu.t_us) filter.add(drive.frames[frame++]);
     while (wheels && wheel < drive.drive.wheels.size() && drive.drive.wheels[wheel].t_us <= imu.t_us)
       filter.add(drive.drive.wheels[wheel++]);
     (void)filter.advance(imu);
+    filter.clear_records();
     seen(filter);
   }
 }

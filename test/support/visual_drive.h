@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "msckf/msckf.h"
+#include "navigation/navigation.h"
 #include "simulation/scenarios.h"
 #include "simulation/scene/street.h"
 #include "simulation/scene/tracks.h"
@@ -13,7 +13,7 @@ namespace roadfix::test {
 
 struct VisualDrive {
   SimulatedDrive drive;
-  std::vector<msckf::SeenFrame> frames;
+  std::vector<TrackPicture> frames;
   std::vector<double> outliers;  ///< share, per frame
 };
 
@@ -34,16 +34,17 @@ VisualDriveConfig highway_drive(double duration_s);
 /// A minute straight on at constant speed after a start from rest, a right angle to the left, twelve seconds more.
 VisualDriveConfig turn_drive();
 VisualDrive make_drive(const VisualDriveConfig& config, uint64_t seed);
-/// What a calibration of this car says.
-MsckfConfig filter_config(const VisualDriveConfig& config);
+/// What a calibration of this car says; no GNSS is used.
+navigation::NavigationConfig filter_config(const VisualDriveConfig& config);
 SE3 T_vehicle_camera();
 /// Of the imu in the vehicle.
 SE3 imu_place(const SimulatedDrive& drive);
 /// Camera, axle and mounting as an imu that sits there has them.
-void tell_place(const SimulatedDrive& drive, MsckfVehicle& vehicle);
+void tell_place(const SimulatedDrive& drive, navigation::VehicleFacts& vehicle);
 
 /// Feeds everything in the order of stamps and calls seen(filter) after every imu sample.
-void run(Msckf& filter, const VisualDrive& drive, bool wheels, const std::function<void(const Msckf&)>& seen);
+void run(navigation::Navigation& filter, const VisualDrive& drive, bool wheels,
+         const std::function<void(navigation::Navigation&)>& seen);
 
 /// Error (position and rotation of local(), velocity, imu axes) of an output that began at rest at the start.
 Eigen::Matrix<double, 9, 1> error_of(const Odometry& estimate, const VisualDrive& drive);

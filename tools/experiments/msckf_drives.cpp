@@ -1,5 +1,6 @@
-/// Drives of the visual-inertial filter on tracks without pixels; prints one JSON object a line.
+/// Drives of the navigation filter without GNSS on tracks without pixels; prints one JSON object a line.
 ///   msckf_drives city|short|turn|highway FIRST_SEED LAST_SEED [--wheels]
+/// first_s: of the first valid pose.
 /// drift_pct: error of the position at the end over the way driven. scale_pct: of the distance driven in the ten
 /// seconds after the turn. nees: mean of position, attitude and velocity at the end.
 #include <cstdio>
@@ -27,7 +28,7 @@ test::VisualDriveConfig drive_of(const std::string& name) {
 struct Result {
   double way = 0.0, error = 0.0, sigma = 0.0, nees = 0.0, scale = 0.0;
   int resets = 0;
-  double invalid_s = 0.0;  ///< after the first valid pose
+  double first_s = -1.0, invalid_s = 0.0;  ///< first valid pose; without one after it
 };
 
 double length_of(const std::vector<Eigen::Vector3d>& points) {
@@ -38,27 +39,28 @@ double length_of(const std::vector<Eigen::Vector3d>& points) {
 
 Result drive(const test::VisualDriveConfig& car, uint64_t seed, bool wheels, bool learnt, double scored_from_s) {
   test::VisualDrive d = test::make_drive(car, seed);
-  MsckfConfig config = test::filter_config(car);
-  config.aiding.use_wheels = wheels;
+  navigation::NavigationConfig config = test::filter_config(car);
+  config.sources.wheel_speed = wheels;
   if (learnt) {  // what GNSS has taught before: the rear wheels' scale but for one part in a thousand
     const auto& scale = d.drive.errors.wheel_scale;
     RandomStream random(seed, 0x3CA1E);
     const double known = 0.5 * (scale[2] + scale[3]) + kLearntScaleStd * random.normal();
     for (WheelSample& w : d.drive.wheels)
       for (double& speed : w.speeds) speed /= 1.0 + known;
-    config.vehicle.wheel_scale_std = kLearntScaleStd;
+    config.facts.wheel_scale_std = kLearntScaleStd;
   }
-  Msckf filter(config);
+  navigation::Navigation filter(config);
   Result r;
   std::vector<Eigen::Vector3d> truth, estimate, all;
   const int64_t start = d.drive.imu.front().t_us;
-  MsckfOutput last;
+  navigation::NavigationOutput last;
   bool begun = false;
   int count = 0;
-  test::run(filter, d, wheels, [&](const Msckf& f) {
+  test::run(filter, d, wheels, [&](navigation::Navigation& f) {
     if (++count % 10 != 0) return;
     last = f.output();
     const bool valid = last.odometry.validity != Validity::kInvalid;
+    if (!begun && valid) r.first_s = seconds_between(start, last.odometry.t_us);
     begun = begun || valid;
     if (begun && !valid) r.invalid_s += 0.1;
     all.push_back(d.drive.truth_at(last.odometry.t_us).T_frame_vehicle.p);
@@ -93,8 +95,8 @@ int run(int argc, char** argv) {
     std::printf(
         "{\"seed\": %d, \"way_m\": %.1f, \"error_m\": %.3f, \"drift_pct\": %.4f, \"sigma_m\": %.3f, \"scale_pct\": "
         "%.4f, "
-        "\"nees\": %.3f, \"resets\": %d, \"invalid_s\": %.1f}\n",
-        seed, r.way, r.error, 100.0 * r.error / r.way, r.sigma, 100.0 * std::abs(r.scale), r.nees, r.resets,
+        "\"nees\": %.3f, \"resets\": %d, \"first_s\": %.2f, \"invalid_s\": %.1f}\n",
+        seed, r.way, r.error, 100.0 * r.error / r.way, r.sigma, 100.0 * std::abs(r.scale), r.nees, r.resets, r.first_s,
         r.invalid_s);
     std::fflush(stdout);
   }

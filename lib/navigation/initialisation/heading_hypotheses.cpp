@@ -30,6 +30,8 @@ constexpr double kLocalPlace = 1e-4;  // m: where a local frame begins is a conv
 
 double square(double x) { return x * x; }
 
+}  // namespace
+
 BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double yaw_std) {
   const VehicleFacts& v = c.facts;
   BaseVector std = BaseVector::Zero();
@@ -51,8 +53,6 @@ BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double y
   std.segment<3>(kGnssBias) = s.bias_std;
   return std;
 }
-
-}  // namespace
 
 double vehicle_yaw(const Mean& x) {
   const Eigen::Vector3d forward = x.nav.q_level_imu * (vehicle::R_imu_vehicle(x.mounting) * Eigen::Vector3d::UnitX());

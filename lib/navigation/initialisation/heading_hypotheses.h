@@ -76,6 +76,8 @@ class HeadingHypotheses {
   size_t leader_ = 0;
 };
 
+/// What is known of the base block at a start, but for the camera.
+BaseVector start_sigmas(const NavigationConfig& config, const StartState& start, double yaw_std);
 /// rad, standard deviation of the vehicle's heading: the imu's and the mounting's errors together.
 double vehicle_heading_std(const State& state);
 /// rad, of the vehicle's x axis in the level frame.

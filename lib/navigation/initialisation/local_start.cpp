@@ -9,6 +9,7 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr double kWheelAge = 0.3;         // s, of a wheel speed to start with
+constexpr double kEvery = 0.1;            // s between two attempts
 constexpr double kForward = 4.0;          // m/s: faster, hardly a car is in reverse
 constexpr double kRestSpeed = 0.02;       // m/s, of wheels that stand
 constexpr double kRestVelocity = 0.02;    // m/s, sigma of a start where wheels say that it stands
@@ -70,9 +71,15 @@ std::optional<StartState> start_with_speed(const LocalContext& c) {
   return s;
 }
 
+bool LocalStart::due(int64_t t_us) {
+  if (seconds_between(tried_us_, t_us) < kEvery) return false;
+  tried_us_ = t_us;
+  return true;
+}
+
 std::optional<StartState> LocalStart::attempt(const NavigationConfig& config, int64_t t_us,
                                               const inertial::StandstillDetector& standstill,
-                                              const CameraControl* camera) const {
+                                              const CameraControl* camera, bool fresh) const {
   LocalContext context{config, t_us, standstill, std::nullopt, std::nullopt};
   if (camera != nullptr) {
     Mean x;
@@ -82,11 +89,11 @@ std::optional<StartState> LocalStart::attempt(const NavigationConfig& config, in
       context.still_flow_px = flow->still_px;
     }
   }
-  const bool fresh = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < kWheelAge;
+  const bool heard = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < kWheelAge;
   const double speed = std::abs(speed_);
-  if (fresh && (has_sign_ || speed < kRestSpeed || speed > kForward)) context.wheel_speed = speed_;
+  if (heard && (has_sign_ || speed < kRestSpeed || speed > kForward)) context.wheel_speed = speed_;
   if (const auto rest = start_at_rest(context)) return rest;
-  return start_with_speed(context);
+  return fresh ? start_with_speed(context) : std::nullopt;
 }
 
 }  // namespace roadfix::navigation

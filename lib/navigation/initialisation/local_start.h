@@ -35,18 +35,20 @@ class LocalStart {
     speed_ = wheels.value.x();
     has_sign_ = wheels.direction != WheelDirection::kUnknown;
   }
-  /// The first strategy that can. `camera`: nothing without one.
+  /// Between the ends of blocks, now and then: pictures may show rest that the last block had.
+  [[nodiscard]] bool due(int64_t t_us);
+  /// The first strategy that can. `camera`: nothing without one. `fresh`: the block ends now; else rest alone is asked for.
   [[nodiscard]] std::optional<StartState> attempt(const NavigationConfig& config, int64_t t_us,
                                                   const inertial::StandstillDetector& standstill,
-                                                  const CameraControl* camera) const;
+                                                  const CameraControl* camera, bool fresh) const;
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(wheels_at_us_, speed_, has_sign_);
+    a(wheels_at_us_, speed_, has_sign_, tried_us_);
   }
 
  private:
-  int64_t wheels_at_us_ = 0;
+  int64_t wheels_at_us_ = 0, tried_us_ = 0;
   double speed_ = 0.0;
   bool has_sign_ = false;
 };

@@ -31,6 +31,20 @@ bool hardly_known(const State& state) {
          variance(kCameraOffset) > kOffsetKnown * kOffsetKnown;
 }
 
+/// Their part of the covariance.
+void columns_of(const State& state, const Columns& columns, Eigen::MatrixXd& P) {
+  P.resize(columns.size(), columns.size());
+  int row = 0;
+  for (const auto& [at, height] : columns.blocks()) {
+    int column = 0;
+    for (const auto& [other, width] : columns.blocks()) {
+      P.block(row, column, height, width) = state.P().block(at, other, height, width);
+      column += width;
+    }
+    row += height;
+  }
+}
+
 int64_t micros(double s) { return static_cast<int64_t>(std::llround(1e6 * s)); }
 
 }  // namespace
@@ -58,6 +72,12 @@ void CameraControl::restart() {
   fitness_ = CameraFitness::kOnTrial;
   misfit_ = trial_ = 0.0;
   pose_us_ = 0;
+}
+
+void CameraControl::begin_smoothing() {
+  restart();
+  presume_fit();
+  smoothing_ = true;
 }
 
 void CameraControl::skip_before(int64_t t_us, const Mean& x) {
@@ -117,7 +137,7 @@ bool CameraControl::makes_pose(const SeenPicture& picture, int64_t t_us, bool st
   return !picture.points.empty() && !standing && !same && t_us - pose_us_ >= micros(tuning_.pose_interval);
 }
 
-std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
+std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing, Filter* course) {
   const int64_t t_us = *next_us(filter.state().x);
   const bool same = !used_.empty() && same_picture(used_.back().picture, waiting_.front().picture);
   const TimedPicture& now = pass_waiting();
@@ -129,13 +149,16 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
   }
   const double dt_s = pose_us_ == 0 ? 0.0 : seconds_between(pose_us_, t_us);
   State& state = filter.state();
-  add_pose(filter, t_us);
+  const int64_t id = next_pose_++;
+  add_pose(filter, id, t_us);
+  if (course != nullptr) add_pose(*course, id, t_us);
+  pose_us_ = t_us;
   tracks_.add(seen, state.clones.back().id);
   const bool full = static_cast<int>(state.clones.size()) > tuning_.poses;
   choose_tracks(state, full);
-  try_tracks(state);
-  const bool iterated =
-      hardly_known(state) && update_.counts().residual_sum > tuning_.iterate_above * update_.counts().dof_sum;
+  try_tracks(state, course != nullptr ? &course->state() : nullptr);
+  const bool iterated = !smoothing_ && hardly_known(state) &&
+                        update_.counts().residual_sum > tuning_.iterate_above * update_.counts().dof_sum;
   std::optional<State> settled;
   if (iterated) settled = iterate(state);
   judge(dt_s);
@@ -158,19 +181,18 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing) {
   } else if (fitness_ != CameraFitness::kFit) {
     record.status = AidingStatus::kBadQuality;
   }
-  if (full) drop_oldest(state);
+  if (full) drop_oldest(state, course != nullptr ? &course->state() : nullptr);
   return counts.tried() > 0 ? std::optional(record) : std::nullopt;
 }
 
-void CameraControl::add_pose(Filter& filter, int64_t t_us) {
+void CameraControl::add_pose(Filter& filter, int64_t id, int64_t t_us) const {
   filter.flush();
   State& state = filter.state();
   const Mean& x = state.x;
   state.move_reference(x.nav.position);
   // Over the sample that the picture lies in: a smoothed rate would miss a hundredth of a radian of a rough road.
   const Eigen::Vector3d rate = filter.last_step().rate - x.nav.q_level_imu.conjugate() * filter.earth().rate();
-  state.add_clone(next_pose_++, rate, stamps_.jitter());
-  pose_us_ = t_us;
+  state.add_clone(id, rate, stamps_.jitter());
   // From the imu's epoch to the picture's moment.
   const double dt = seconds_between(x.t_us, t_us);
   Clone& pose = state.clones.back();
@@ -209,22 +231,18 @@ void CameraControl::choose_tracks(const State& state, bool full) {
   tracks_.drop_ended();
 }
 
-void CameraControl::try_tracks(const State& state) {
+void CameraControl::try_tracks(const State& state, const State* course) {
   const Mean& x = state.x;
   window_.camera = {x.T_imu_camera, x.lens, x.T_left_right};
   window_.views.clear();
   for (const Clone& c : state.clones) window_.views.push_back({c.R, c.p - state.p_ref});
   const Columns columns(state);
-  const int n = columns.size();
-  window_.P.resize(n, n);
-  window_.expected.resize(state.held() ? n : 0);
+  columns_of(state, columns, window_.P);
+  window_.P_course.resize(0, 0);
+  if (course != nullptr) columns_of(*course, columns, window_.P_course);
+  window_.expected.resize(state.held() ? columns.size() : 0);
   int row = 0;
   for (const auto& [at, height] : columns.blocks()) {
-    int column = 0;
-    for (const auto& [other, width] : columns.blocks()) {
-      window_.P.block(row, column, height, width) = state.P().block(at, other, height, width);
-      column += width;
-    }
     if (state.held()) window_.expected.segment(row, height) = state.expected().segment(at, height);
     row += height;
   }
@@ -269,6 +287,7 @@ void CameraControl::judge(double dt_s) {
   const double misfit = update_.misfit();
   const double share = 1.0 - std::exp(-step / tuning_.judged_over);
   misfit_ += share * (misfit - misfit_);
+  if (smoothing_) return;
   switch (fitness_) {
     case CameraFitness::kFit:
       if (misfit_ > tuning_.unfit_above) {
@@ -286,10 +305,11 @@ void CameraControl::judge(double dt_s) {
   }
 }
 
-void CameraControl::drop_oldest(State& state) {
+void CameraControl::drop_oldest(State& state, State* course) {
   const int64_t oldest = state.clones.front().id;
   tracks_.forget_clone(oldest);
   state.remove_clone(oldest);
+  if (course != nullptr) course->remove_clone(oldest);
 }
 
 }  // namespace roadfix::navigation

@@ -30,11 +30,20 @@ class CameraControl {
   /// When the next waiting picture was taken, the imu's clock.
   [[nodiscard]] std::optional<int64_t> next_us(const Mean& x) const;
   /// Uses it: `filter` stands at the imu's epoch at or after its moment. Nothing where no track was tried.
-  std::optional<AidingRecord> use(Filter& filter, bool standing);
+  /// `course`, of a start in motion: the same means with none of their errors but those since its beginning; tracks are judged
+  /// by these then.
+  std::optional<AidingRecord> use(Filter& filter, bool standing, Filter* course = nullptr);
   /// Drops what was taken before this time: the filter is past it.
   void skip_before(int64_t t_us, const Mean& x);
   /// The filter began anew: tracks are forgotten, what waits stays, and the camera is on trial again.
   void restart();
+  /// There is nothing else to tell motion by: it is taken for fit until its tracks show otherwise.
+  void presume_fit() { fitness_ = CameraFitness::kFit; }
+  /// Restarts; then tracks are used whatever they say of the camera: a course that is not right yet says nothing of it.
+  void begin_smoothing();
+  void end_smoothing() { smoothing_ = false; }
+  /// Tracks have fitted lately.
+  [[nodiscard]] bool fits() const { return misfit_ < tuning_.fit_below; }
   /// The filter jumped: tracks are forgotten, and its poses.
   void forget_poses(State& state);
 
@@ -67,7 +76,7 @@ class CameraControl {
   }
 
  private:
-  static constexpr size_t kMostWaiting = 64;  ///< pictures
+  static constexpr size_t kMostWaiting = 128;  ///< pictures
 
   struct TimedPicture {
     int64_t t_us = 0, id = 0;
@@ -83,13 +92,13 @@ class CameraControl {
   /// Moves the first picture that waits to those that were used, of which the last half second stays.
   const TimedPicture& pass_waiting();
   [[nodiscard]] bool makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const;
-  void add_pose(Filter& filter, int64_t t_us);
+  void add_pose(Filter& filter, int64_t id, int64_t t_us) const;
   void choose_tracks(const State& state, bool full);
-  void try_tracks(const State& state);
+  void try_tracks(const State& state, const State* course = nullptr);
   [[nodiscard]] bool apply(State& state);
   [[nodiscard]] std::optional<State> iterate(const State& prior);
   void judge(double dt_s);
-  void drop_oldest(State& state);
+  void drop_oldest(State& state, State* course);
 
   CameraTuning tuning_;
   Camera left_;
@@ -105,6 +114,7 @@ class CameraControl {
   CameraFitness fitness_ = CameraFitness::kOnTrial;
   double misfit_ = 0.0, trial_ = 0.0;  ///< fading mean of pictures' misfit, and s of trial that spoke for the camera
   int num_seen_ = 0;
+  bool smoothing_ = false;  ///< within a start in motion
 };
 
 }  // namespace roadfix::navigation

@@ -22,17 +22,18 @@ void TrackUpdate::begin(const TrackWindow& window) {
   stacked_ = 0;
 }
 
-double TrackUpdate::nis(int first_row, int rows) {
+double TrackUpdate::nis(int first_row, int rows, const Eigen::MatrixXd& P, bool about_means) {
   const int n = window_->columns();
   const auto H = work_.block(first_row, 3, rows, n);
   auto HP = HP_.topLeftCorner(rows, n);
   auto S = S_.topLeftCorner(rows, rows);
-  HP.noalias() = H * window_->P.topLeftCorner(n, n);
+  HP.noalias() = H * P.topLeftCorner(n, n);
   S.noalias() = HP * H.transpose();
   S.diagonal().array() += 1.0;
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);
   if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxTrackRows, 1> r = work_.block(first_row, 3 + n, rows, 1);
+  if (about_means) r += H * window_->expected.head(n);
   llt.matrixL().solveInPlace(r);
   return r.squaredNorm();
 }
@@ -61,9 +62,10 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
   whiten_track(seen, window_->two_eyes, work.topRows(rows));
   eliminate_columns(work.topRows(rows), 3);
   const int dof = rows - 3;
-  const double squared = nis(3, dof);
+  const bool by_course = window_->P_course.size() > 0;
+  const double squared = by_course ? nis(3, dof, window_->P_course, true) : nis(3, dof, window_->P, false);
   misfits_.push_back(std::min(squared / dof, tuning_.refuse));
-  if (!(squared <= tuning_.refuse * dof)) {
+  if (!by_course && !(squared <= tuning_.refuse * dof)) {
     ++counts_.refused;
     return false;
   }

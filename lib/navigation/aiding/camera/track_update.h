@@ -27,6 +27,8 @@ struct TrackWindow {
   bool two_eyes = false;
   Eigen::MatrixXd P;         ///< of the columns, TrackColumns::of_view(number of views) of them
   Eigen::VectorXd expected;  ///< what their errors are expected to be; empty: zero
+  /// Where it is not empty, tracks are judged by how they fit the means, whose errors are these, (N.7.15).
+  Eigen::MatrixXd P_course;
 
   [[nodiscard]] int columns() const { return TrackColumns::of_view(static_cast<int>(views.size())); }
 };
@@ -51,7 +53,7 @@ class TrackUpdate {
   static constexpr size_t kMostMisfits = 256;
 
   /// Squared length of the rows' residual by what is expected of it; infinite where that breaks.
-  [[nodiscard]] double nis(int first_row, int rows);
+  [[nodiscard]] double nis(int first_row, int rows, const Eigen::MatrixXd& P, bool about_means);
   void push(const Eigen::Ref<const Eigen::MatrixXd>& rows);
   void compress();
 

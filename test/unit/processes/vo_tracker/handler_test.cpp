@@ -175,32 +175,21 @@ TEST_CASE("an even window size is refused with its file, line and value") {
   }
 }
 
-TEST_CASE("the automatic mode follows the sensors: lengths from the IMU without other sources") {
+TEST_CASE("the keyframe odometry runs unless the filter is asked for, whatever the sensors") {
   Calibration c = calibration(false);
   const auto clock_of = [&](const VoTrackerConfig& config) {
     const auto stage = make_vo_tracker(c, config);
     const StageSpec& spec = stage->spec();
     return spec.inputs.at(static_cast<std::size_t>(spec.clocks.at(0).input)).channel;
   };
-  VoTrackerConfig keyframe;
-  keyframe.mode = VoMode::kKeyframe;
+  VoTrackerConfig filter;
+  filter.mode = VoMode::kFilter;
   CHECK(clock_of({}) == "CAMERA_LEFT");
+  CHECK_THROWS_WITH(clock_of(filter), Catch::Contains("sensors.imu"));
   c.sensors.imu.emplace();
-  CHECK(clock_of({}) == "IMU");
-  CHECK(clock_of(keyframe) == "CAMERA_LEFT");
-  CHECK(make_vo_tracker(c, {})->effective_config().find("mode: msckf") != std::string::npos);
-  c.sensors.wheels.emplace();
   CHECK(clock_of({}) == "CAMERA_LEFT");
-  c.sensors.wheels.reset();
-  c.sensors.camera_right = calibration(true).sensors.camera_right;
-  CHECK(clock_of({}) == "CAMERA_RIGHT");
-  // A rig on its side: only gravity gives the vertical, which the keyframe tracker does not measure.
-  c.mounting = MountingCalibration{std::nullopt, Eigen::Vector3d(10.0, 10.0, 180.0)};
-  CHECK(clock_of({}) == "CAMERA_RIGHT");
-  c.mounting->std_deg = Eigen::Vector3d::Constant(180.0);
-  CHECK(clock_of({}) == "IMU");
-  c.sensors.wheels.emplace();
-  CHECK(clock_of({}) == "CAMERA_RIGHT");
+  CHECK(clock_of(filter) == "IMU");
+  CHECK(make_vo_tracker(c, filter)->effective_config().find("mode: filter") != std::string::npos);
 }
 
 TEST_CASE("missing calibration entries are named at the start") {
