@@ -48,9 +48,8 @@ class Fusion {
   /// Takes in one sample; the state moves to its time.
   FuseStatus add(const ChannelSample& sample);
 
-  /// Both poses for now: at the newest sample of `lookahead`, or at t_us() where there is none ahead. Counts jumps of
-  /// the published pose.
-  FusedPoses publish(const Lookahead& lookahead) { return output_.publish(now(), started_, lookahead); }
+  /// Both poses for now: at the time of `newest`, or at t_us() where that is not ahead. Counts jumps of the published pose.
+  FusedPoses publish(const NewestSample& newest) { return output_.publish(now(), started_, newest); }
 
   [[nodiscard]] int64_t t_us() const { return t_us_; }
   [[nodiscard]] const Imm& imm() const { return local_.imm(); }

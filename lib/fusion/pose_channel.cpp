@@ -24,15 +24,15 @@ bool finite(const Values& values) {
   return (values.array() * 0.0).sum() == 0.0;
 }
 
+double square(double x) { return x * x; }
+
+}  // namespace
+
 bool usable(const Odometry& o) {
   return finite(o.T_frame_vehicle.p) && std::abs(o.T_frame_vehicle.q.norm() - 1.0) < 1e-3 && finite(o.velocity) &&
          finite(o.angular_rate) && finite(o.cov_pose) && finite(o.cov_velocity) &&
          o.cov_pose.diagonal().minCoeff() >= 0.0;
 }
-
-double square(double x) { return x * x; }
-
-}  // namespace
 
 PoseChannel::PoseChannel(FusionChannel channel, const ChannelNoise& noise)
     : channel_(channel), noise_(noise), calibration_(noise.calibration) {}

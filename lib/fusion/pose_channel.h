@@ -32,6 +32,9 @@ struct ChannelSample {
   }
 };
 
+/// Finite, and an attitude that is one.
+bool usable(const Odometry& odometry);
+
 enum class FuseStatus { kAccepted, kGated, kNotReady, kBadInput, kBadQuality, kReset, kDisabled };
 
 enum class ChannelState {
@@ -104,6 +107,7 @@ class PoseChannel {
   [[nodiscard]] const Planar& correction() const { return correction_; }
   [[nodiscard]] const Eigen::Matrix3d& covariance_before() const { return P_before_; }
   [[nodiscard]] bool was_reset() const { return was_reset_; }
+  [[nodiscard]] int reset_counter() const { return reset_counter_; }
 
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visit) {

@@ -14,40 +14,61 @@ const char* name_of(FusionChannel c) {
   return c == FusionChannel::kVo ? "POSE_VO" : "POSE_WHEEL";
 }
 
+constexpr double kLongestGap = 0.3;  ///< s, over which velocities are the motion
+
 int rank(Validity v) { return static_cast<int>(v); }
 
-bool relies_on(const FusionNow& now, const std::optional<Lookahead::Ahead>& ahead) {
-  if (!ahead || !ahead->valid) return false;
-  return now.channel(ahead->channel).good(now.t_us) || now.local.leader() == ahead->channel;
+/// What is ahead of the horizon: the clock's newest sample, and the motion by its channel's velocities from there.
+struct Ahead {
+  const Odometry* newest = nullptr;  ///< none: nothing is ahead
+  FusionChannel channel = FusionChannel::kIns;
+  bool joined = false;  ///< to what the fusion has taken in of its channel
+  bool enu = false;
+  double dt = 0.0, rise = 0.0;
+  Planar motion = Planar::Zero();
+  Planar correction = Planar::Zero();  ///< by which the newest pose is not where the velocities lead
+};
+
+Ahead ahead_of(const FusionNow& now, const NewestSample& n) {
+  Ahead a;
+  if (!n.sample || n.sample->odometry.t_us <= now.t_us) return a;
+  a.newest = &n.sample->odometry;
+  a.channel = n.sample->channel;
+  a.enu = n.sample->enu;
+  a.dt = seconds_between(now.t_us, a.newest->t_us);
+  const PoseChannel& clock = now.channel(a.channel);
+  a.joined = clock.alive(now.t_us) && clock.reset_counter() == n.sample->reset_counter &&
+             (!n.invalid_us || *n.invalid_us <= clock.t_us()) &&
+             seconds_between(clock.t_us(), a.newest->t_us) < kLongestGap;
+  if (!a.joined) return a;
+  const LevelView view = level_view(*a.newest);
+  const VelocityMotion whole = motion_by_velocity(clock.view(), view);
+  const double known = seconds_between(clock.t_us(), now.t_us);
+  a.motion = motion_between(motion_ahead(clock.view(), known), whole.way);
+  a.rise = whole.rise - known * clock.view().velocity.z();
+  a.correction = difference_of(view.pose, after_motion(clock.view().pose, whole.way));
+  return a;
 }
 
-/// Motion from `from` to now: by the lookahead as far as it is relied on.
-MotionStep motion_to_now(const FusionNow& now, const CarriedPose& from, const std::optional<Lookahead::Ahead>& ahead) {
-  if (!ahead) return now.local.motion(now.channels, from.t_us(), now.t_us);
-  if (!relies_on(now, ahead)) return now.local.motion(now.channels, from.t_us(), ahead->newest.t_us);
-  const PoseChannel& clock = now.channel(ahead->channel);
-  const MotionStep here = now.local.motion(now.channels, from.t_us(), now.t_us);
-  const MotionStep then = clock.corrected(ahead->motion, ahead->rise, ahead->dt);
-  MotionSum sum;
-  sum.add(here);
-  sum.add(then);
-  return {sum.motion, sum.Q, sum.by_calibration, sum.rise, sum.dt};
-}
-
-Odometry carried(const FusionNow& now, const CarriedPose& pose, const std::optional<Lookahead::Ahead>& ahead) {
-  const MotionStep tail = motion_to_now(now, pose, ahead);
-  const int64_t now_us = ahead ? ahead->newest.t_us : now.t_us;
+/// A pose of the horizon, carried on to now: by what is ahead as far as that is relied on.
+Odometry carried(const FusionNow& now, const CarriedPose& pose, const Ahead& ahead) {
+  const int64_t now_us = ahead.newest ? ahead.newest->t_us : now.t_us;
+  const bool relied =
+      ahead.joined && (now.channel(ahead.channel).good(now.t_us) || now.local.leader() == ahead.channel);
+  MotionSum tail;
+  tail.add(now.local.motion(now.channels, pose.t_us(), relied ? now.t_us : now_us));
+  if (relied) tail.add(now.channel(ahead.channel).corrected(ahead.motion, ahead.rise, ahead.dt));
   const MovedPlanar here = moved_by(pose.pose(), tail.motion);
   const Eigen::Matrix3d P = here.by_start * pose.covariance(now.channels) * here.by_start.transpose() +
                             here.by_motion * tail.Q * here.by_motion.transpose();
   Odometry attitude = now.local.attitude(now.channels, now_us);
-  if (relies_on(now, ahead) && ahead->channel != FusionChannel::kVo) {
+  if (relied && ahead.channel != FusionChannel::kVo) {
     const double length =
-        ahead->channel == FusionChannel::kIns ? 1.0 : now.channel(ahead->channel).calibration().length();
-    attitude.T_frame_vehicle.q = ahead->newest.T_frame_vehicle.q;
-    attitude.velocity = length * ahead->newest.velocity;
-    attitude.angular_rate = ahead->newest.angular_rate;
-    attitude.cov_velocity = ahead->newest.cov_velocity;
+        ahead.channel == FusionChannel::kIns ? 1.0 : now.channel(ahead.channel).calibration().length();
+    attitude.T_frame_vehicle.q = ahead.newest->T_frame_vehicle.q;
+    attitude.velocity = length * ahead.newest->velocity;
+    attitude.angular_rate = ahead.newest->angular_rate;
+    attitude.cov_velocity = ahead.newest->cov_velocity;
   }
   return full_pose(now_us, here.pose, P, pose.height() + tail.rise, pose.height_variance() + tail.rise * tail.rise,
                    attitude);
@@ -63,29 +84,30 @@ Validity validity_of(const FusionNow& now) {
 
 }  // namespace
 
-FusedPoses PoseOutput::publish(const FusionNow& now, bool started, const Lookahead& lookahead) {
+FusedPoses PoseOutput::publish(const FusionNow& now, bool started, const NewestSample& newest) {
   FusedPoses out;
-  const auto ahead = lookahead.from(now.t_us);
   if (!started) {
     out.report.reason = "waits for a pose";
-    out.fused.t_us = out.local.t_us = lookahead.newest_us().value_or(now.t_us);
+    out.fused.t_us = out.local.t_us = newest.sample ? newest.sample->odometry.t_us : now.t_us;
     return out;
   }
+  const Ahead ahead = ahead_of(now, newest);
   out.local = carried(now, now.local.pose(), ahead);
   out.report = report(now);
   const PoseChannel& ins = now.channel(FusionChannel::kIns);
-  const bool newest = now.failover.follows() && ahead && ahead->channel == FusionChannel::kIns && ahead->valid &&
-                      !now.failover.implausible(ahead->correction, ins.view().P) && ahead->enu == now.failover.enu();
-  if (newest)
-    out.fused = ahead->newest;
-  else if (now.failover.follows() && !ahead && ins.t_us() == now.t_us)
+  const bool follows = now.failover.follows();
+  const bool by_newest = follows && ahead.joined && ahead.channel == FusionChannel::kIns &&
+                         ahead.enu == now.failover.enu() && !now.failover.implausible(ahead.correction, ins.view().P);
+  if (by_newest)
+    out.fused = *ahead.newest;
+  else if (follows && !ahead.newest && ins.t_us() == now.t_us)
     out.fused = ins.odometry();
   else
     out.fused = carried(now, now.failover.pose(), ahead);
   // What the INS says of its newest pose counts at once, where it says worse.
   Validity validity = out.report.validity;
-  if (newest && rank(ahead->newest.validity) < rank(validity)) validity = ahead->newest.validity;
-  if (now.failover.follows() && ahead && !newest) validity = std::min(validity, Validity::kCoasting);
+  if (by_newest) validity = std::min(validity, ahead.newest->validity);
+  if (follows && ahead.newest && !by_newest) validity = std::min(validity, Validity::kCoasting);
   out.report.validity = validity;
   if (validity != Validity::kValid && out.report.phase == FusionPhase::kRunning) out.report.phase = FusionPhase::kWeak;
   out.fused.validity = validity;

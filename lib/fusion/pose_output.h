@@ -6,9 +6,19 @@
 
 #include "fusion/failover.h"
 #include "fusion/jump_count.h"
-#include "fusion/lookahead.h"
 
 namespace roadfix {
+
+/// The newest sample of the clock's channel, which the fusion may not use yet.
+struct NewestSample {
+  std::optional<ChannelSample> sample;
+  std::optional<int64_t> invalid_us;  ///< of the newest one that was invalid or no pose
+
+  void see(const ChannelSample& s) {
+    if (s.odometry.validity == Validity::kInvalid || !usable(s.odometry)) invalid_us = s.odometry.t_us;
+    sample = s;
+  }
+};
 
 enum class FusionPhase { kWaiting, kRunning, kWeak, kLost };
 
@@ -46,9 +56,9 @@ class PoseOutput {
   /// `dt` s after the last call. A worse validity counts at once, a better one when it has held for a while.
   void settle(const FusionNow& now, double dt);
 
-  /// Both poses at the newest sample of `lookahead`, or at now.t_us where none is ahead; before the start none. Counts
-  /// the jumps of the published pose.
-  FusedPoses publish(const FusionNow& now, bool started, const Lookahead& lookahead);
+  /// Both poses at the time of `newest`, or at now.t_us where that is not ahead; before the start none. Counts the jumps
+  /// of the published pose.
+  FusedPoses publish(const FusionNow& now, bool started, const NewestSample& newest);
 
   /// In plain words, what keeps POSE_FUSED from being the INS's pose with fixes; empty where nothing does.
   [[nodiscard]] static std::string reason(const FusionNow& now);

@@ -8,7 +8,6 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "fusion/fusion.h"
-#include "fusion/saved.h"
 #include "geodesy/enu_change.h"
 #include "imm_fusion/messages.h"
 
@@ -51,7 +50,7 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.state_layout = 9;
+    spec_.state_layout = 10;
     // Vision counts when it is 150 ms old, so that the others need not wait for it.
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0},
                     {"POSE_INS", "pose_t", 0, 0},
@@ -71,7 +70,6 @@ class ImmFusionStage final : public Stage {
   [[nodiscard]] const StageSpec& spec() const override { return spec_; }
 
   void apply(const Message& m) override {
-    lookahead_.drop_until(m.utime);
     switch (m.input) {
       case kInsStatus:
         take(decode<ins_status_t>(m.bytes));
@@ -90,7 +88,7 @@ class ImmFusionStage final : public Stage {
     ChannelSample sample = channel_sample(channel_of(m.input), message, m.seq);
     sample.reset_counter = ahead_counts_[static_cast<std::size_t>(sample.channel)].after(message);
     if (sample.enu && anchor_) to_first_anchor(anchor_of(message), sample.odometry);
-    lookahead_.see(sample);
+    newest_.see(sample);
   }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
@@ -98,7 +96,7 @@ class ImmFusionStage final : public Stage {
     aidings_.clear();
     const bool poses_due = pose_slot_.due(now_utime);
     if (poses_due || fusion_.asks_restart()) {
-      FusedPoses poses = fusion_.publish(lookahead_);
+      FusedPoses poses = fusion_.publish(newest_);
       if (fusion_.asks_restart()) {
         vo_restart_t message = vo_restart(fusion_.take_restart(poses.local));
         outputs.publish(kRestart, message);
@@ -136,7 +134,6 @@ class ImmFusionStage final : public Stage {
     }
     fusion_.save(writer);
     literal_.save(writer);
-    fusion::SnapshotWriter{writer}(lookahead_);
     return writer.take();
   }
 
@@ -159,7 +156,6 @@ class ImmFusionStage final : public Stage {
     }
     loaded.fusion_.load(reader);
     loaded.literal_.load(reader);
-    fusion::SnapshotReader{reader}(loaded.lookahead_);
     reader.finish();
     *this = std::move(loaded);
   }
@@ -226,7 +222,7 @@ class ImmFusionStage final : public Stage {
   StageSpec spec_;
   Fusion fusion_;  ///< at the horizon
   LiteralFusion literal_;
-  Lookahead lookahead_;
+  NewestSample newest_;
   std::optional<Geodetic> anchor_;
   int8_t origin_ = pose_t::ORIGIN_IMU;
   bool vo_by_velocity_ = false;
