@@ -10,12 +10,6 @@ constexpr double kHeightFloor = 0.01;  ///< m per sqrt(s)
 
 std::size_t at(FusionChannel c) { return static_cast<std::size_t>(c); }
 
-/// P of the pose at which a sum of motions begins, carried to its end, and the sum's own R.
-Eigen::Matrix3d carried(const Planar& pose, const Eigen::Matrix3d& P, const Planar& motion, const Eigen::Matrix3d& R) {
-  const MovedPlanar moved = moved_by(pose, motion);
-  return moved.by_start * P * moved.by_start.transpose() + moved.by_motion * R * moved.by_motion.transpose();
-}
-
 }  // namespace
 
 void CarriedPose::start(int64_t t_us, const Planar& pose, const Eigen::Matrix3d& P, double height,
@@ -26,7 +20,7 @@ void CarriedPose::start(int64_t t_us, const Planar& pose, const Eigen::Matrix3d&
   height_ = height;
   height_variance_ = height_variance;
   sum_ = {};
-  way_ = dt_ = 0.0;
+  way_ = 0.0;
 }
 
 void CarriedPose::close(const Channels& channels) {
@@ -38,29 +32,18 @@ void CarriedPose::close(const Channels& channels) {
   way_ = 0.0;
 }
 
-void CarriedPose::lead(FusionChannel by, const Channels& channels) {
-  if (by != by_ && sum_.dt > 0.0) close(channels);
-  by_ = by;
-}
-
 void CarriedPose::add(int64_t t_us, const MotionStep& step) {
   sum_.add(step);
   way_ += step.motion.head<2>().norm();
-  dt_ += step.dt;
   t_us_ = t_us;
 }
 
 void CarriedPose::carry(FusionChannel by, const Channels& channels) {
   const PoseChannel& channel = channels[at(by)];
   if (channel.t_us() <= t_us_) return;
-  lead(by, channels);
+  if (by != by_ && sum_.dt > 0.0) close(channels);
+  by_ = by;
   add(channel.t_us(), channel.step(t_us_));
-}
-
-void CarriedPose::carry_ahead(FusionChannel by, const Channels& channels, int64_t t_us) {
-  if (t_us <= t_us_) return;
-  lead(by, channels);
-  add(t_us, channels[at(by)].by_velocity(seconds_between(t_us_, t_us)));
 }
 
 void CarriedPose::carry(int64_t t_us, const MotionStep& step, const Channels& channels) {
@@ -70,7 +53,8 @@ void CarriedPose::carry(int64_t t_us, const MotionStep& step, const Channels& ch
 }
 
 Eigen::Matrix3d CarriedPose::covariance(const Channels& channels) const {
-  return carried(pose_, P_, sum_.motion, sum_.covariance(channels[at(by_)].calibration().covariance()));
+  return moved_covariance(moved_by(pose_, sum_.motion), P_,
+                          sum_.covariance(channels[at(by_)].calibration().covariance()));
 }
 
 double CarriedPose::height_variance() const {

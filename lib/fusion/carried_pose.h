@@ -12,8 +12,6 @@ class CarriedPose {
 
   /// Goes on to the time of the newest sample of channel `by`. Another channel than before closes the account of that.
   void carry(FusionChannel by, const Channels& channels);
-  /// Goes on to t_us by that channel's velocity.
-  void carry_ahead(FusionChannel by, const Channels& channels, int64_t t_us);
   /// Goes on to t_us by a motion that no channel gave.
   void carry(int64_t t_us, const MotionStep& step, const Channels& channels);
 
@@ -22,16 +20,13 @@ class CarriedPose {
   [[nodiscard]] Eigen::Matrix3d covariance(const Channels& channels) const;
   [[nodiscard]] double height() const { return height_ + sum_.rise; }
   [[nodiscard]] double height_variance() const;
-  [[nodiscard]] double dt() const { return dt_; }  ///< s since start()
 
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visit) {
-    visit(self.t_us_, self.pose_, self.P_, self.height_, self.height_variance_, self.sum_, self.way_, self.dt_,
-          self.by_);
+    visit(self.t_us_, self.pose_, self.P_, self.height_, self.height_variance_, self.sum_, self.way_, self.by_);
   }
 
  private:
-  void lead(FusionChannel by, const Channels& channels);
   void close(const Channels& channels);
   void add(int64_t t_us, const MotionStep& step);
 
@@ -40,8 +35,7 @@ class CarriedPose {
   Eigen::Matrix3d P_ = Eigen::Matrix3d::Zero();
   double height_ = 0.0, height_variance_ = 0.0;
   MotionSum sum_;
-  double way_ = 0.0;  ///< m, of sum_
-  double dt_ = 0.0;
+  double way_ = 0.0;                        ///< m, of sum_
   FusionChannel by_ = FusionChannel::kIns;  ///< whose calibration sum_ depends on
 };
 

@@ -12,7 +12,7 @@ constexpr double kNoLengths = 1e3;  ///< m: a sigma that says nothing of a way's
 void MotionSum::add(const MotionStep& step) {
   const MovedPlanar moved = moved_by(motion, step.motion);
   motion = moved.pose;
-  Q = moved.by_start * Q * moved.by_start.transpose() + moved.by_motion * step.Q * moved.by_motion.transpose();
+  Q = moved_covariance(moved, Q, step.Q);
   by_calibration = moved.by_start * by_calibration + moved.by_motion * step.by_calibration;
   rise += step.rise;
   dt += step.dt;

@@ -94,8 +94,8 @@ bool Failover::readmits(const PoseChannel& ins, const Channels& channels, const 
   if (aided >= (contradicted_ ? config_.refusal_timeout : kFixes)) return true;
   const MotionStep tail = local.motion(channels, pose_.t_us(), t_us);
   const MovedPlanar here = moved_by(pose_.pose(), tail.motion);
-  const Eigen::Matrix3d S = here.by_start * pose_.covariance(channels) * here.by_start.transpose() +
-                            here.by_motion * tail.Q * here.by_motion.transpose() + ins.view().P + floor_of_poses();
+  const Eigen::Matrix3d S =
+      moved_covariance(here, pose_.covariance(channels), tail.Q) + ins.view().P + floor_of_poses();
   const Planar d = difference_of(ins.view().pose, here.pose);
   return d.dot(S.ldlt().solve(d)) < config_.agreement.gate;
 }

@@ -102,20 +102,6 @@ Planar motion_between(const Planar& a, const Planar& b) {
 
 Planar after_motion(const Planar& a, const Planar& motion) { return moved_by(a, motion).pose; }
 
-Eigen::Matrix3d motion_by_start(const Planar& a, const Planar& b) {
-  const Planar m = motion_between(a, b);
-  Eigen::Matrix3d J = -motion_by_end(a);
-  J(0, 2) = m.y();
-  J(1, 2) = -m.x();
-  return J;
-}
-
-Eigen::Matrix3d motion_by_end(const Planar& a) {
-  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
-  J.topLeftCorner<2, 2>() = rotation(-a.z());
-  return J;
-}
-
 MovedPlanar moved_by(const Planar& a, const Planar& motion) {
   const Eigen::Matrix2d R = rotation(a.z());
   const Eigen::Vector2d d = R * motion.head<2>();
@@ -126,6 +112,10 @@ MovedPlanar moved_by(const Planar& a, const Planar& motion) {
   m.by_start(1, 2) = d.x();
   m.by_motion.topLeftCorner<2, 2>() = R;
   return m;
+}
+
+Eigen::Matrix3d moved_covariance(const MovedPlanar& m, const Eigen::Matrix3d& P, const Eigen::Matrix3d& R) {
+  return m.by_start * P * m.by_start.transpose() + m.by_motion * R * m.by_motion.transpose();
 }
 
 Eigen::Matrix3d turned(const Eigen::Matrix3d& P, double c, double s) {

@@ -43,16 +43,14 @@ Planar motion_between(const Planar& a, const Planar& b);
 /// The pose reached from a by a motion in a's axes.
 Planar after_motion(const Planar& a, const Planar& motion);
 
-/// d motion_between / d a and / d b.
-Eigen::Matrix3d motion_by_start(const Planar& a, const Planar& b);
-Eigen::Matrix3d motion_by_end(const Planar& a);
-
 /// after_motion and its Jacobians, the yaw's sine and cosine worked out once.
 struct MovedPlanar {
   Planar pose;
   Eigen::Matrix3d by_start, by_motion;
 };
 MovedPlanar moved_by(const Planar& a, const Planar& motion);
+/// Covariance of the pose reached: P of the start, R of the motion.
+Eigen::Matrix3d moved_covariance(const MovedPlanar& moved, const Eigen::Matrix3d& P, const Eigen::Matrix3d& R);
 
 /// T P T' of a pose's covariance: as a frame sees it in which the first one is turned by an angle of cosine c, sine s.
 Eigen::Matrix3d turned(const Eigen::Matrix3d& P, double c, double s);

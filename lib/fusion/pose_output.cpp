@@ -59,8 +59,7 @@ Odometry carried(const FusionNow& now, const CarriedPose& pose, const Ahead& ahe
   tail.add(now.local.motion(now.channels, pose.t_us(), relied ? now.t_us : now_us));
   if (relied) tail.add(now.channel(ahead.channel).corrected(ahead.motion, ahead.rise, ahead.dt));
   const MovedPlanar here = moved_by(pose.pose(), tail.motion);
-  const Eigen::Matrix3d P = here.by_start * pose.covariance(now.channels) * here.by_start.transpose() +
-                            here.by_motion * tail.Q * here.by_motion.transpose();
+  const Eigen::Matrix3d P = moved_covariance(here, pose.covariance(now.channels), tail.Q);
   Odometry attitude = now.local.attitude(now.channels, now_us);
   if (relied && ahead.channel != FusionChannel::kVo) {
     const double length =

@@ -23,7 +23,6 @@ class VisionRestartRequest {
   /// Asks where there is a tie and the last request is `every` seconds old.
   void ask(int64_t t_us, double every, const char* reason);
   [[nodiscard]] bool asked() const { return !reason_.empty(); }
-  [[nodiscard]] bool tied() const { return tied_; }
   /// `length`: true metres per metre of the vision.
   [[nodiscard]] VisionRestart take(const Odometry& local, double length);
 

@@ -119,6 +119,4 @@ const Witnesses::Comparison& Witnesses::comparison(FusionChannel a, FusionChanne
   return pairs_[static_cast<std::size_t>(index(a, b))].last;
 }
 
-double Witnesses::nis(FusionChannel a, FusionChannel b) const { return comparison(a, b).nis; }
-
 }  // namespace roadfix

@@ -55,8 +55,6 @@ class Witnesses {
 
   [[nodiscard]] std::optional<int64_t> last_us() const;
   [[nodiscard]] WitnessAgreement agreement(FusionChannel a, FusionChannel b) const;
-  /// NIS of the last comparison of the two, over the short window; 0 where there was none.
-  [[nodiscard]] double nis(FusionChannel a, FusionChannel b) const;
   /// Squared distances of the innovation and its variances, over the short window, for the record.
   struct Comparison {
     bool done = false;
@@ -72,7 +70,6 @@ class Witnesses {
   [[nodiscard]] const Comparison& comparison(FusionChannel a, FusionChannel b) const;
   /// Of one channel over the last `epochs` epochs; nothing where it was not there, or not of one segment, all the time.
   [[nodiscard]] std::optional<WindowMotion> window(FusionChannel c, int epochs, const Channels& channels) const;
-  [[nodiscard]] int epochs() const { return static_cast<int>(history_.size()); }
 
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visit) {
