@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fusion/saved.h"
+#include "geometry/euler.h"
 
 namespace roadfix {
 
@@ -40,11 +41,6 @@ Fusion::Fusion(const FusionConfig& config)
       failover_(config) {}
 
 void Fusion::set_gnss(int64_t t_us, bool present) { failover_.set_gnss(t_us, present); }
-
-void Fusion::set_ins_gyro(const Eigen::Vector3d& bias_std, const YawPitchRoll& mounting) {
-  const Eigen::RowVector3d up = quaternion(mounting).toRotationMatrix().row(2);
-  at(FusionChannel::kIns).set_drift(up.cwiseProduct(bias_std.transpose()).norm());
-}
 
 FuseStatus Fusion::add(const ChannelSample& s) {
   const auto refused = [&](FuseStatus status) {
@@ -101,7 +97,6 @@ Epoch Fusion::epoch_at(int64_t at_us) const {
     w.track = channel.pose(at_us);
     w.P = channel.view().P;
     w.velocity_variance = 0.5 * channel.odometry().cov_velocity.topLeftCorner<2, 2>().trace();
-    w.drift_variance = channel.drift() * channel.drift();
   }
   return e;
 }

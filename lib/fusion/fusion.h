@@ -17,7 +17,6 @@
 #include "fusion/pose_output.h"
 #include "fusion/vision_restart.h"
 #include "fusion/witnesses.h"
-#include "geometry/euler.h"
 
 namespace roadfix {
 
@@ -41,9 +40,6 @@ class Fusion {
 
   /// Whether fixes aid the INS now.
   void set_gnss(int64_t t_us, bool present);
-  /// What the INS says of its gyro: standard deviation of its bias by axis, rad/s, and how the axes lie in the vehicle. Its
-  /// yaw drifts with that.
-  void set_ins_gyro(const Eigen::Vector3d& bias_std, const YawPitchRoll& mounting);
 
   /// Takes in one sample; the state moves to its time.
   FuseStatus add(const ChannelSample& sample);

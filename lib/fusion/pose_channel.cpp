@@ -85,6 +85,7 @@ void PoseChannel::measure(const LevelView& now, double z, const ChannelSample& s
   const bool jumped = apart > kJump + kJumpShare * by_velocity.way.head<2>().norm();
   correction_ = difference_of(now.pose, after_motion(view_.pose, by_velocity.way));
   P_before_ = view_.P;
+  yaw_growth_ = dt > 0.0 ? std::max(0.0, now.P(2, 2) - view_.P(2, 2)) / dt : 0.0;
   before_us_ = view_.t_us;
   if (s.by_velocity || channel_ == FusionChannel::kIns || jumped || was_reset_) {
     step_ = by_velocity.way;
@@ -119,7 +120,7 @@ Eigen::Matrix3d PoseChannel::step_noise(double dt) const {
     // Its velocity's error lasts: as the white noise that displaces as much over twice that time.
     const double lasts = 2.0 * noise_.correlation * dt;
     for (int i = 0; i < 2; ++i) q(i) += lasts * last_->cov_velocity(i, i);
-    q(2) += lasts * square(drift_);
+    q(2) += yaw_growth_ * dt;
   }
   return q.asDiagonal();
 }

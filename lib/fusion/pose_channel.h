@@ -86,13 +86,10 @@ class PoseChannel {
   [[nodiscard]] Eigen::Matrix3d window_noise(const Planar& motion, double dt) const;
   /// Compares its squared residual of a window with what is expected: sets the noise factors (F.4.4).
   void adapt(const Planar& residual, const Planar& motion, double dt, const Eigen::Matrix3d& reference);
-  /// Of an INS: standard deviation of its yaw's drift, rad/s.
-  void set_drift(double sigma) { drift_ = sigma; }
 
   [[nodiscard]] const Odometry& odometry() const { return *last_; }
   [[nodiscard]] const LevelView& view() const { return view_; }
   [[nodiscard]] bool enu() const { return enu_; }
-  [[nodiscard]] double drift() const { return drift_; }
   [[nodiscard]] bool lengths_of_wheels() const { return lengths_of_wheels_; }
   [[nodiscard]] int64_t t_us() const { return view_.t_us; }
   [[nodiscard]] std::optional<int64_t> last_us() const { return ever_us_; }
@@ -113,7 +110,7 @@ class PoseChannel {
   static void visit_members(Self& self, const Visitor& visit) {
     visit(self.calibration_, self.last_, self.view_, self.before_us_, self.step_, self.rise_, self.track_, self.recent_,
           self.correction_, self.P_before_, self.factors_, self.ever_us_, self.repeated_since_us_, self.segment_,
-          self.reset_counter_, self.trial_left_, self.drift_, self.metric_, self.enu_, self.lengths_of_wheels_,
+          self.reset_counter_, self.trial_left_, self.yaw_growth_, self.metric_, self.enu_, self.lengths_of_wheels_,
           self.invalid_, self.frozen_, self.contradicted_, self.was_reset_);
   }
 
@@ -150,7 +147,7 @@ class PoseChannel {
   int segment_ = 0;
   int reset_counter_ = 0;
   int trial_left_ = 0;
-  double drift_ = 0.0;
+  double yaw_growth_ = 0.0;  ///< rad2/s, of the variance that it claims, from its last sample but one
   bool metric_ = true;
   bool enu_ = false;
   bool lengths_of_wheels_ = false;

@@ -16,7 +16,7 @@ Eigen::Matrix3d ins_noise(const Witness& from, const Witness& to, const Planar& 
   Eigen::Matrix3d P;
   for (int i = 0; i < 3; ++i) {
     const double velocity = std::max(from.velocity_variance, to.velocity_variance);
-    const double led = (i < 2 ? velocity : from.drift_variance) * dt * dt;
+    const double led = i < 2 ? velocity * dt * dt : std::max(0.0, to.P(i, i) - from.P(i, i));
     const double lasting = led + std::max(0.0, from.P(i, i) - to.P(i, i)) + forgotten * from.P(i, i);
     P.row(i).setZero();
     P(i, i) = std::min(from.P(i, i) + to.P(i, i), lasting);

@@ -18,10 +18,9 @@ struct Witness {
   // Of an INS alone:
   Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
   double velocity_variance = 0.0;  ///< m2/s2
-  double drift_variance = 0.0;     ///< rad2/s2
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visit) {
-    visit(self.comparable, self.segment, self.track, self.P, self.velocity_variance, self.drift_variance);
+    visit(self.comparable, self.segment, self.track, self.P, self.velocity_variance);
   }
 };
 

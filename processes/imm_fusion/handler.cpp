@@ -169,8 +169,6 @@ class ImmFusionStage final : public Stage {
     const bool gnss = (m.aided_by & ins_status_t::AIDED_GNSS_POSITION) != 0;
     fusion_.set_gnss(m.utime, gnss);
     literal_.set_gnss(m.utime, gnss);
-    fusion_.set_ins_gyro({m.gyro_bias_std_radps[0], m.gyro_bias_std_radps[1], m.gyro_bias_std_radps[2]},
-                         {m.mounting_rad[2], m.mounting_rad[1], m.mounting_rad[0]});
   }
 
   void take(const vo_status_t& m) {
