@@ -97,9 +97,7 @@ MotionStep LocalMotion::motion(const Channels& channels, int64_t from_us, int64_
     if (channel.has_track(from_us) && from_us < channel.t_us()) {
       const int64_t known_us = std::min(to_us, channel.t_us());
       MotionSum sum;
-      sum.add(channel.corrected(motion_between(channel.track(from_us), channel.track(known_us)), 0.0,
-                                seconds_between(from_us, known_us)));
-      sum.rise = channel.view().velocity.z() * sum.dt;
+      sum.add(channel.measured(from_us, known_us));
       if (known_us < to_us) sum.add(motion(channels, known_us, to_us));
       return {sum.motion, sum.Q, sum.by_calibration, sum.rise, sum.dt};
     }

@@ -65,11 +65,11 @@ FuseStatus PoseChannel::add(const ChannelSample& s) {
     correction_.setZero();
   }
   if (was_reset_ || !last_ || now.pose != view_.pose) repeated_since_us_ = now.t_us;
-  if (!last_ || before_us_ != view_.t_us) before_us_ = now.t_us;  // no step
   last_ = s.odometry;
   view_ = now;
   while (!recent_.empty() && seconds_between(recent_.front().t_us, now.t_us) > kRecent) recent_.pop_front();
-  recent_.push_back({now.t_us, track_});
+  track_.t_us = now.t_us;
+  recent_.push_back(track_);
   enu_ = s.enu;
   lengths_of_wheels_ = s.lengths_of_wheels;
   return was_reset_ ? FuseStatus::kReset : FuseStatus::kAccepted;
@@ -86,29 +86,30 @@ void PoseChannel::measure(const LevelView& now, double z, const ChannelSample& s
   correction_ = difference_of(now.pose, after_motion(view_.pose, by_velocity.way));
   P_before_ = view_.P;
   yaw_growth_ = dt > 0.0 ? std::max(0.0, now.P(2, 2) - view_.P(2, 2)) / dt : 0.0;
-  before_us_ = view_.t_us;
-  if (s.by_velocity || channel_ == FusionChannel::kIns || jumped || was_reset_) {
-    step_ = by_velocity.way;
-    rise_ = by_velocity.rise;
+  const bool of_a_filter = s.by_velocity || channel_ == FusionChannel::kIns;
+  if (of_a_filter || jumped || was_reset_) {
+    track_.way = after_motion(track_.way, by_velocity.way);
+    track_.rise += by_velocity.rise;
   } else {
-    step_ = by_pose;
-    rise_ = z - last_->T_frame_vehicle.p.z();
+    track_.way = after_motion(track_.way, by_pose);
+    track_.rise += z - last_->T_frame_vehicle.p.z();
   }
   if (was_reset_) calibration_.forget_scale();
-  const bool of_a_filter = s.by_velocity || channel_ == FusionChannel::kIns;
   if (was_reset_ || (jumped && !of_a_filter)) begin_segment();
-  track_ = after_motion(track_, step_);
   calibration_.age(dt);
 }
 
-Planar PoseChannel::track(int64_t t_us) const {
-  if (recent_.empty() || t_us >= recent_.back().t_us) return after_motion(track_, motion_ahead(view_, since(t_us)));
+PoseChannel::TrackPoint PoseChannel::track_at(int64_t t_us) const {
+  if (recent_.empty() || t_us >= recent_.back().t_us)
+    return {t_us, after_motion(track_.way, motion_ahead(view_, since(t_us))),
+            track_.rise + since(t_us) * view_.velocity.z()};
   const auto after = std::upper_bound(recent_.begin(), recent_.end(), t_us,
                                       [](int64_t t, const TrackPoint& point) { return t < point.t_us; });
-  if (after == recent_.begin()) return after->track;
+  if (after == recent_.begin()) return *after;
   const TrackPoint& before = *std::prev(after);
   const double share = seconds_between(before.t_us, t_us) / seconds_between(before.t_us, after->t_us);
-  return after_motion(before.track, share * motion_between(before.track, after->track));
+  return {t_us, after_motion(before.way, share * motion_between(before.way, after->way)),
+          before.rise + share * (after->rise - before.rise)};
 }
 
 Eigen::Matrix3d PoseChannel::step_noise(double dt) const {
@@ -133,10 +134,14 @@ MotionStep PoseChannel::corrected(const Planar& measured, double rise, double dt
   return s;
 }
 
+MotionStep PoseChannel::measured(int64_t from_us, int64_t to_us) const {
+  const TrackPoint from = track_at(from_us), to = track_at(to_us);
+  return corrected(motion_between(from.way, to.way), to.rise - from.rise, seconds_between(from_us, to_us));
+}
+
 MotionStep PoseChannel::step(int64_t from_us) const {
-  const double dt = seconds_between(from_us, view_.t_us);
-  if (from_us == before_us_) return corrected(step_, rise_, dt);
-  return by_velocity(dt);
+  if (has_track(from_us)) return measured(from_us, view_.t_us);
+  return by_velocity(seconds_between(from_us, view_.t_us));
 }
 
 MotionStep PoseChannel::by_velocity(double dt, double change) const {

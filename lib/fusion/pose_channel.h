@@ -52,16 +52,17 @@ class PoseChannel {
 
   /// Takes in a sample. Older ones, and what is no pose, are refused.
   FuseStatus add(const ChannelSample& sample);
-  /// The motion that the last add() brought since `from_us`, corrected; by its velocity where that is not its last
-  /// sample's time.
+  /// Its motion from `from_us` to its newest sample, corrected: by its velocity where track() does not reach back so far.
   [[nodiscard]] MotionStep step(int64_t from_us) const;
+  /// Its motion between two times that track() knows.
+  [[nodiscard]] MotionStep measured(int64_t from_us, int64_t to_us) const;
   /// A motion of dt seconds with its newest velocity, changed along by `change` (m/s).
   [[nodiscard]] MotionStep by_velocity(double dt, double change = 0.0) const;
   /// Sum of its motions as measured, at t_us: between its samples of the last second, or carried on by its velocity.
-  [[nodiscard]] Planar track(int64_t t_us) const;
+  [[nodiscard]] Planar track(int64_t t_us) const { return track_at(t_us).way; }
   /// Its pose then, likewise.
   [[nodiscard]] Planar pose(int64_t t_us) const {
-    return after_motion(view_.pose, motion_between(track_, track(t_us)));
+    return after_motion(view_.pose, motion_between(track_.way, track(t_us)));
   }
   /// Whether track() reaches back to that time.
   [[nodiscard]] bool has_track(int64_t t_us) const { return !recent_.empty() && recent_.front().t_us <= t_us; }
@@ -108,10 +109,10 @@ class PoseChannel {
 
   template <class Self, class Visitor>
   static void visit_members(Self& self, const Visitor& visit) {
-    visit(self.calibration_, self.last_, self.view_, self.before_us_, self.step_, self.rise_, self.track_, self.recent_,
-          self.correction_, self.P_before_, self.factors_, self.ever_us_, self.repeated_since_us_, self.segment_,
-          self.reset_counter_, self.trial_left_, self.yaw_growth_, self.metric_, self.enu_, self.lengths_of_wheels_,
-          self.invalid_, self.frozen_, self.contradicted_, self.was_reset_);
+    visit(self.calibration_, self.last_, self.view_, self.track_, self.recent_, self.correction_, self.P_before_,
+          self.factors_, self.ever_us_, self.repeated_since_us_, self.segment_, self.reset_counter_, self.trial_left_,
+          self.yaw_growth_, self.metric_, self.enu_, self.lengths_of_wheels_, self.invalid_, self.frozen_,
+          self.contradicted_, self.was_reset_);
   }
 
  private:
@@ -122,23 +123,22 @@ class PoseChannel {
 
   struct TrackPoint {
     int64_t t_us = 0;
-    Planar track = Planar::Zero();
+    Planar way = Planar::Zero();
+    double rise = 0.0;  ///< m
     template <class Self, class Visitor>
     static void visit_members(Self& self, const Visitor& visit) {
-      visit(self.t_us, self.track);
+      visit(self.t_us, self.way, self.rise);
     }
   };
+  [[nodiscard]] TrackPoint track_at(int64_t t_us) const;
 
   FusionChannel channel_;
   ChannelNoise noise_;
   ChannelCalibration calibration_;
   std::optional<Odometry> last_;
-  LevelView view_;                ///< of last_
-  int64_t before_us_ = 0;         ///< start of step_
-  Planar step_ = Planar::Zero();  ///< measured
-  double rise_ = 0.0;
-  Planar track_ = Planar::Zero();
-  std::deque<TrackPoint> recent_;  ///< of its track, oldest first
+  LevelView view_;                 ///< of last_
+  TrackPoint track_;               ///< sum of its measured motions
+  std::deque<TrackPoint> recent_;  ///< oldest first
   Planar correction_ = Planar::Zero();
   Eigen::Matrix3d P_before_ = Eigen::Matrix3d::Zero();
   Eigen::Vector2d factors_ = Eigen::Vector2d::Ones();  ///< on the variances of place and yaw
