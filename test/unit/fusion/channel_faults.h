@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
@@ -46,6 +47,18 @@ struct Freeze {
   }
 };
 
+/// Samples come a second late, with the times that they are of.
+struct Late {
+  std::deque<Odometry> kept;
+  bool operator()(StreamEvent& e, double) {
+    kept.push_back(e.sample.odometry);
+    if (seconds_between(kept.front().t_us, kept.back().t_us) < 1.0) return false;
+    e.sample.odometry = kept.front();
+    kept.pop_front();
+    return true;
+  }
+};
+
 inline std::vector<StreamEvent> with(std::vector<StreamEvent> events, const Tunnel& t,
                                      const std::vector<Fault>& faults) {
   std::vector<StreamEvent> kept;
@@ -66,13 +79,16 @@ inline const std::vector<Fault>& faults() {
       {"INS dead", kIns, gone, "POSE_INS is silent", 2.5},
       {"INS invalid", kIns, says_invalid, "POSE_INS is invalid", 2.5},
       {"INS frozen", kIns, Freeze{}, "POSE_INS", 5.0},
+      {"INS late", kIns, Late{}, "POSE_INS is silent", 2.5},
       {"INS lies", kIns, lies, "POSE_INS contradicts POSE_VO and POSE_WHEEL", 8.0},
       {"INS broken", kIns, says_nan, "POSE_INS is silent", 2.5},
       {"vision dead", kVo, gone, "", 0.5},
       {"vision frozen", kVo, Freeze{}, "", 0.5},
+      {"vision late", kVo, Late{}, "", 0.5},
       {"vision lies", kVo, lies, "POSE_VO contradicts", 0.5},
       {"wheels dead", kWheel, gone, "", 0.5},
       {"wheels frozen", kWheel, Freeze{}, "", 0.5},
+      {"wheels late", kWheel, Late{}, "", 0.5},
       {"wheels lie", kWheel, lies, "POSE_WHEEL contradicts", 0.5},
   };
   return kFaults;
