@@ -1,5 +1,7 @@
 #include "monitor/messages.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -16,6 +18,9 @@ constexpr std::array<const char*, 14> kSources = {"GNSS position", "GNSS velocit
                                                   "No sideslip",   "Standing still", "No rotation",  "Magnetic heading",
                                                   "POSE_INS",      "POSE_VO",        "POSE_WHEEL",   "Wheel yaw rate",
                                                   "Camera tracks", "Prior pose"};
+
+/// In the order of fusion_state2_t::HEALTH_*.
+constexpr std::array<const char*, 5> kHealthWords = {"silent", "invalid", "frozen", "on trial", "contradicted"};
 
 using Row = std::pair<const char*, const char*>;
 /// The first prefix that fits.
@@ -100,6 +105,28 @@ std::string source_name(const std::string& channel, int8_t source) {
   const std::string name = i < kSources.size() ? kSources[i] : "Unknown source";
   const std::size_t underscore = channel.find('_');
   return name + " in " + (underscore == std::string::npos ? channel : channel.substr(underscore + 1));
+}
+
+std::vector<std::string> fusion_lines(const fusion_state2_t& m) {
+  const std::string leader = m.leader.empty() ? "no channel" : m.leader;
+  std::string source = "no fused pose yet";
+  if (m.source == fusion_state2_t::SOURCE_INS) source = "fused pose: POSE_INS";
+  if (m.source == fusion_state2_t::SOURCE_CARRIED) source = "fused pose: carried on by " + leader;
+  if (m.source == fusion_state2_t::SOURCE_LITERAL) source = "fused pose: scheme of Lee et al. (2025)";
+  if (!m.reason.empty()) source += "; " + m.reason;
+  for (std::size_t i = 0; i < m.mode_name.size(); ++i)
+    if (m.mode_name[i] == "constant_turn") source += fmt::format("; turns: {:.0f} %", 100.0 * m.mode_probability[i]);
+  std::string channels;
+  for (std::size_t i = 0; i < m.channel_name.size(); ++i) {
+    const auto health = static_cast<uint8_t>(m.channel_health[i]);
+    channels += (channels.empty() ? "" : ", ") + m.channel_name[i] + " ";
+    if (m.channel_health[i] == fusion_state2_t::HEALTH_GOOD)
+      channels += fmt::format("{:.0f} %", 100.0 * m.channel_weight[i]);
+    else
+      channels += health < kHealthWords.size() ? kHealthWords[health] : "unknown";
+    if (!m.channel_contradicts[i].empty()) channels += " (contradicts " + m.channel_contradicts[i] + ")";
+  }
+  return {source, channels};
 }
 
 health_t health_message(const HealthReport& report) {

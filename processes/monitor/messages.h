@@ -3,11 +3,13 @@
 
 #include <optional>
 #include <roadfix/aiding_t.hpp>
+#include <roadfix/fusion_state2_t.hpp>
 #include <roadfix/health_t.hpp>
 #include <roadfix/heartbeat_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/protection_level_t.hpp>
 #include <string>
+#include <vector>
 
 #include "health/health.h"
 
@@ -20,6 +22,9 @@ std::optional<BoundFacts> bound_facts(const protection_level_t& message);
 
 /// "GNSS position in INS": the source and whose estimate it went into.
 std::string source_name(const std::string& channel, int8_t source);
+
+/// What POSE_FUSED is and why, then weight or health of each channel and whom it contradicts: lines for a page.
+std::vector<std::string> fusion_lines(const fusion_state2_t& message);
 
 /// utime, run and seq are the caller's.
 health_t health_message(const HealthReport& report);

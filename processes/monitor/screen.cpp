@@ -208,13 +208,15 @@ std::string clock_text(int64_t utime) {
   return fmt::format("{:02}:{:02}:{:02}", s / 3600 % 24, s / 60 % 60, s % 60);
 }
 
-std::string render_screen(const HealthReport& report, const ScreenSize& size, bool colour) {
+std::string render_screen(const HealthReport& report, const ScreenSize& size, bool colour,
+                          const std::vector<std::string>& fusion) {
   Page page(size, colour);
   const std::string played =
       report.lag_s != 0.0 ? fmt::format(", a drive of {} ago", duration(std::abs(report.lag_s))) : std::string();
   page.line(fmt::format(" Roadfix {} UTC{}", clock_text(report.now_us), played), kDim);
   put_verdict(page, report, size.columns);
   put_estimate(page, report, size.columns);
+  for (const std::string& line : fusion) page.line(" " + line);
   put_reasons(page, report);
   put_channels(page, report);
   put_processes(page, report);

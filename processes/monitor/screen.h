@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "health/health.h"
 
@@ -13,8 +14,10 @@ struct ScreenSize {
   int rows = 24;
 };
 
-/// Exactly `rows` lines of at most `columns` characters (UTF-8), colours as escape sequences where asked for.
-std::string render_screen(const HealthReport& report, const ScreenSize& size, bool colour);
+/// Exactly `rows` lines of at most `columns` characters (UTF-8), colours as escape sequences where asked for. `fusion`: what
+/// the fusion does, one line each.
+std::string render_screen(const HealthReport& report, const ScreenSize& size, bool colour,
+                          const std::vector<std::string>& fusion = {});
 
 /// The verdict and its reasons in one line, for where there is no terminal.
 std::string plain_line(const HealthReport& report);

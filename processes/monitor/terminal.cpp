@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "bus/types/message.h"
+#include "monitor/messages.h"
 #include "monitor/screen.h"
 
 namespace roadfix {
@@ -15,6 +17,7 @@ namespace {
 
 constexpr int64_t kRedraw_us = 500'000;
 constexpr int64_t kLine_us = 10'000'000;
+constexpr int64_t kFusion_us = 2'000'000;  // older than this it says nothing of now
 constexpr const char* kEnter = "\x1b[?1049h\x1b[?25l\x1b[2J";
 constexpr const char* kLeave = "\x1b[?25h\x1b[?1049l";
 
@@ -45,6 +48,12 @@ Terminal::~Terminal() {
   if (in_place_) std::cout << kLeave << std::flush;
 }
 
+void Terminal::message(const std::string&, const std::string& type, const BusMessage& message, int64_t now_us) {
+  if (type != "fusion_state2_t") return;
+  fusion_ = fusion_lines(decode<fusion_state2_t>(message.bytes));
+  fusion_us_ = now_us;
+}
+
 void Terminal::decided(const HealthReport& report, bool changed) {
   const int64_t period_us = in_place_ ? kRedraw_us : kLine_us;
   if ((!changed && report.now_us - drawn_us_ < period_us) || !takes_output()) return;
@@ -60,7 +69,8 @@ void Terminal::draw(const HealthReport& report) {
   const ScreenSize size = screen_size();
   const char* no_colour = std::getenv("NO_COLOR");
   const std::string page =
-      render_screen(report, {size.columns, size.rows - 1}, no_colour == nullptr || *no_colour == 0);
+      render_screen(report, {size.columns, size.rows - 1}, no_colour == nullptr || *no_colour == 0,
+                    report.now_us - fusion_us_ < kFusion_us ? fusion_ : std::vector<std::string>{});
   std::string text = "\x1b[H";
   for (const char c : page) text += c == '\n' ? std::string("\x1b[K\r\n") : std::string(1, c);
   text += "\x1b[K\r\n " + footer_.substr(0, static_cast<std::size_t>(std::max(0, size.columns - 2))) + "\x1b[K";

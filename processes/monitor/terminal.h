@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "monitor/handler.h"
 
@@ -15,7 +16,7 @@ class Terminal : public MonitorListener {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
-  void message(const std::string&, const std::string&, const BusMessage&, int64_t) override {}
+  void message(const std::string& channel, const std::string& type, const BusMessage& message, int64_t now_us) override;
   void decided(const HealthReport& report, bool changed) override;
 
  private:
@@ -24,6 +25,8 @@ class Terminal : public MonitorListener {
   bool in_place_;
   std::string footer_;
   int64_t drawn_us_ = 0;
+  std::vector<std::string> fusion_;  ///< what the fusion said last ...
+  int64_t fusion_us_ = 0;            ///< ... and when
 };
 
 }  // namespace roadfix

@@ -59,8 +59,8 @@ export function showFusion(frame) {
     rail.append(element('div', '', { style: `width: ${used ? Math.round(100 * channel.weight) : 0}%` }));
     row.title = `weight ${channel.weight}, variance times ${channel.alpha}, NIS ${channel.nis} of at most ${channel.gate}, heard ${channel.age} s ago`;
     const health = HEALTH[channel.health] || 'not used';
-    if (channel.contradicts) row.title += `; contradicts ${channel.contradicts}`;
-    const words = health === 'good' ? `${used ? Math.round(100 * channel.weight) : 0} %` : health;
+    let words = health === 'good' ? `${used ? Math.round(100 * channel.weight) : 0} %` : health;
+    if (channel.contradicts) words += `, contradicts ${channel.contradicts.split(' ').map(title).join(' and ')}`;
     row.append(element('span', title(channel.name)), rail, element('span', words));
     return row;
   }));

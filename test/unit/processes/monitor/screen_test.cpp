@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 #include <limits>
 
+#include "monitor/messages.h"
+
 using namespace roadfix;
 
 namespace {
@@ -87,6 +89,29 @@ TEST_CASE("the screen shows the protection levels of the judged pose, and why it
   bound.level.y() = std::numeric_limits<double>::infinity();
   report.poses[0].bound = bound;
   CHECK_THAT(render_screen(report, {100, 40}, false), Catch::Contains("no bound at risk 1e-05 per pose"));
+}
+
+TEST_CASE("the screen says which channel carries the fused pose, why, and who contradicts whom") {
+  fusion_state2_t m{};
+  m.source = fusion_state2_t::SOURCE_CARRIED;
+  m.leader = "POSE_WHEEL";
+  m.reason = "POSE_INS is silent";
+  m.mode_name = {"constant_acceleration", "constant_turn"};
+  m.mode_probability = {0.75, 0.25};
+  m.channel_name = {"POSE_INS", "POSE_VO", "POSE_WHEEL"};
+  m.channel_health = {fusion_state2_t::HEALTH_SILENT, fusion_state2_t::HEALTH_CONTRADICTED,
+                      fusion_state2_t::HEALTH_GOOD};
+  m.channel_weight = {0.0, 0.0, 1.0};
+  m.channel_contradicts = {"", "POSE_WHEEL", "POSE_VO"};
+  const std::string page = render_screen(some_report(Verdict::kDegraded), {160, 40}, false, fusion_lines(m));
+  CHECK_THAT(page, Catch::Contains("fused pose: carried on by POSE_WHEEL; POSE_INS is silent; turns: 25 %"));
+  CHECK_THAT(page, Catch::Contains("POSE_INS silent, POSE_VO contradicted (contradicts POSE_WHEEL), POSE_WHEEL 100 % "
+                                   "(contradicts POSE_VO)"));
+  m.source = fusion_state2_t::SOURCE_INS;
+  m.reason.clear();
+  m.channel_health[1] = 77;  // what no fusion says
+  CHECK_THAT(fusion_lines(m)[0], Catch::Equals("fused pose: POSE_INS; turns: 25 %"));
+  CHECK_THAT(fusion_lines(m)[1], Catch::Contains("POSE_VO unknown"));
 }
 
 TEST_CASE("a pose that is none has no numbers") {
