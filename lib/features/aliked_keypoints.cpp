@@ -9,9 +9,9 @@
 namespace roadfix {
 namespace {
 
-constexpr int kMultiple = 32;          ///< of the input's sides, as the encoder's poolings need it
-constexpr int kSuppressionRadius = 2;  ///< px, as published
-constexpr int kBorder = 4;
+constexpr int kMultiple = 32;     ///< of the input's sides, as the encoder's poolings need it
+constexpr int kAlikedRadius = 2;  ///< px, as published
+constexpr int kAlikedBorder = 4;
 /// Descriptors match above a cosine of 0.75, as published: unit vectors are then sqrt(2 - 2 * 0.75) apart.
 constexpr double kMaxDistance = 0.707;
 
@@ -59,7 +59,7 @@ class Aliked final : public KeypointDetector {
     const cv::Mat& map = outputs[scores == outputs.begin() ? 1 : 0];
     if (map.dims != 4 || map.size[2] < 1 || map.size[3] < 1) refuse();
     if (small.rows % map.size[2] != 0 || small.cols * map.size[2] != small.rows * map.size[3]) refuse();
-    Keypoints found = peaks(first_channel(*scores), config_.aliked_min_score, kSuppressionRadius, kBorder);
+    Keypoints found = peaks(first_channel(*scores), config_.aliked_min_score, kAlikedRadius, kAlikedBorder);
     describe(map, static_cast<double>(small.rows) / map.size[2], found);
     return found;
   }

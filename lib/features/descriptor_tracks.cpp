@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "features/corners.h"
+#include "features/median.h"
 #include "features/saved_features.h"
 
 namespace roadfix {
@@ -19,12 +20,6 @@ constexpr int kMaxMissed = 5;
 constexpr size_t kMinMatches = 15;      ///< that show how well places are predicted
 constexpr float kMinRadius_px = 6.0F;   ///< of the close search: a keypoint's own scatter, on a coarse level
 constexpr float kRadiusFactor = 4.45F;  ///< three sigmas by the median deviation of a normal distribution
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Spatial bins over keypoints, as wide as the search radius.
 class Bins {
@@ -110,10 +105,10 @@ DescriptorTracks::Matches DescriptorTracks::match_closely(std::vector<Eigen::Vec
     down.push_back(off.y());
   }
   if (across.size() < kMinMatches) return wide;
-  const Eigen::Vector2f shift(median(across), median(down));
+  const Eigen::Vector2f shift(upper_median(across), upper_median(down));
   for (size_t i = 0; i < across.size(); ++i)
     apart.push_back((Eigen::Vector2f(across[i], down[i]) - shift).cwiseAbs().maxCoeff());
-  const auto radius = static_cast<double>(std::max(kMinRadius_px, kRadiusFactor * median(std::move(apart))));
+  const auto radius = static_cast<double>(std::max(kMinRadius_px, kRadiusFactor * upper_median(std::move(apart))));
   for (Eigen::Vector2f& pixel : expected) pixel += shift;
   if (radius >= config_.match_radius_px) return wide;
   Matches close = match(expected, radius);

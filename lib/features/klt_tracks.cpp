@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "features/corners.h"
+#include "features/median.h"
 #include "features/saved_features.h"
 
 namespace roadfix {
@@ -12,13 +13,6 @@ namespace {
 /// Every eighth track is searched first: the median of their prediction errors shifts the other predictions (pitch
 /// motion is not predicted by the last motion).
 constexpr size_t kProbeInterval = 8;
-
-float median(std::vector<float>& values) {
-  if (values.empty()) return 0.0F;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool inside(const cv::Mat& gray, const Eigen::Vector2f& pixel) {
   return pixel.x() >= 0.0F && pixel.y() >= 0.0F && pixel.x() < static_cast<float>(gray.cols) &&
@@ -76,7 +70,7 @@ std::vector<Feature> KltTracks::track(const cv::Mat& gray, std::span<const Featu
     across.push_back(tracks_[i].place.pixel().x() - predicted[i].x());
     down.push_back(tracks_[i].place.pixel().y() - predicted[i].y());
   }
-  const Eigen::Vector2f shift(median(across), median(down));
+  const Eigen::Vector2f shift(upper_median(across), upper_median(down));
   for (size_t i = 0; same_size && i < tracks_.size(); ++i) {
     if (!is_probe(i)) found[i] = locate(tracks_[i].place, predicted[i] + shift, pyramid) ? 1 : 0;
   }

@@ -15,7 +15,7 @@ namespace {
 constexpr double kLevelFactor = 1.2;
 constexpr int kPatch = 31;  ///< px, of OpenCV's bit pattern
 constexpr int kHalf = kPatch / 2;
-constexpr int kBorder = 19;               ///< margin of the rotated pattern, px of a level
+constexpr int kPatternMargin = 19;        ///< margin of the rotated pattern, px of a level
 constexpr double kKeypointsPerTrack = 3;  ///< more keypoints than tracks, so that matching has alternatives
 
 /// Half the width of a disc of radius kHalf, by the row's distance from its centre.
@@ -46,7 +46,7 @@ float centroid_angle(const cv::Mat& gray, int u, int v) {
 
 cv::Ptr<cv::ORB> make_brief(int levels) {
   constexpr int kAll = 100000;
-  return cv::ORB::create(kAll, static_cast<float>(kLevelFactor), levels, kBorder);
+  return cv::ORB::create(kAll, static_cast<float>(kLevelFactor), levels, kPatternMargin);
 }
 
 class Orb final : public KeypointDetector {
@@ -65,7 +65,7 @@ class Orb final : public KeypointDetector {
       corners.max_corners = static_cast<int>(kKeypointsPerTrack * config_.max_features * shrink * shrink / area);
       corners.min_distance_px = std::max(3.0, 0.3 * config_.min_distance_px);
       corners.fast_threshold = config_.fast_threshold;
-      corners.border_px = kBorder;
+      corners.border_px = kPatternMargin;
       for (const Corner& c : spread_corners(small, {}, corners)) {
         const int u = static_cast<int>(c.pixel.x()), v = static_cast<int>(c.pixel.y());
         const auto grow_u = static_cast<float>(gray.cols) / static_cast<float>(small.cols);
@@ -98,7 +98,8 @@ DescribedCorners describe_corners(const cv::Mat& gray, std::span<const Eigen::Ve
   std::vector<cv::KeyPoint> keys;
   for (size_t i = 0; i < corners.size(); ++i) {
     const int u = static_cast<int>(std::lround(corners[i].x())), v = static_cast<int>(std::lround(corners[i].y()));
-    if (u < kBorder || v < kBorder || u >= gray.cols - kBorder || v >= gray.rows - kBorder) continue;
+    if (u < kPatternMargin || v < kPatternMargin || u >= gray.cols - kPatternMargin || v >= gray.rows - kPatternMargin)
+      continue;
     keys.emplace_back(static_cast<float>(u), static_cast<float>(v), static_cast<float>(kPatch),
                       centroid_angle(gray, u, v), 0.0F, 0, static_cast<int>(i));
   }

@@ -7,8 +7,8 @@
 namespace roadfix {
 namespace {
 
-constexpr int kBorder = 4;
-constexpr int kSuppressionRadius = 4;  ///< px of the input: radius of non-maximum suppression, as published
+constexpr int kSuperpointBorder = 4;
+constexpr int kSuperpointRadius = 4;  ///< px of the input: radius of non-maximum suppression, as published
 
 class SuperPoint final : public KeypointDetector {
  public:
@@ -25,7 +25,7 @@ class SuperPoint final : public KeypointDetector {
     const int rows = small.rows / kNetworkCell, cols = small.cols / kNetworkCell;
     const auto fits = [&](const cv::Mat& m) { return m.dims == 4 && m.size[2] == rows && m.size[3] == cols; };
     if (!fits(detection) || !fits(descriptors) || detection.size[1] != 65) return {};
-    Keypoints found = peaks(heat_map(detection), config_.superpoint_min_score, kSuppressionRadius, kBorder);
+    Keypoints found = peaks(heat_map(detection), config_.superpoint_min_score, kSuperpointRadius, kSuperpointBorder);
     describe(descriptors, kNetworkCell, found);
     enlarge(small.size(), gray.size(), found);
     return found;

@@ -8,9 +8,9 @@
 namespace roadfix {
 namespace {
 
-constexpr int kMultiple = 32;          ///< of the input's sides, as the backbone's strides need it
-constexpr int kSuppressionRadius = 2;  ///< px: a window of 5, as published
-constexpr int kBorder = 4;
+constexpr int kMultiple = 32;    ///< of the input's sides, as the backbone's strides need it
+constexpr int kXfeatRadius = 2;  ///< px: a window of 5, as published
+constexpr int kXfeatBorder = 4;
 /// Descriptors match above a cosine of 0.82, as published: unit vectors are then sqrt(2 - 2 * 0.82) apart.
 constexpr double kMaxDistance = 0.6;
 
@@ -45,7 +45,7 @@ class XFeat final : public KeypointDetector {
     const cv::Mat small = network_input(gray, config_.xfeat_scale, kMultiple);
     const std::vector<cv::Mat> all = network_.run(small);
     const Outputs outputs = sorted(all, small.rows / kNetworkCell, small.cols / kNetworkCell);
-    Keypoints found = peaks(heat_map(*outputs.logits), config_.xfeat_min_score, kSuppressionRadius, kBorder);
+    Keypoints found = peaks(heat_map(*outputs.logits), config_.xfeat_min_score, kXfeatRadius, kXfeatBorder);
     weigh(*outputs.reliability, found);
     describe(*outputs.descriptors, kNetworkCell, found);
     enlarge(small.size(), gray.size(), found);

@@ -15,7 +15,7 @@ constexpr double kLongestPrediction = 1.0;  ///< s, for which an acceleration la
 constexpr double kPlaceSigma = 0.05;        ///< m, of POSE_LOCAL as the IMM sees it
 constexpr double kYawSigma = 0.005;         ///< rad
 
-std::size_t at(FusionChannel c) { return static_cast<std::size_t>(c); }
+std::size_t index_of(FusionChannel c) { return static_cast<std::size_t>(c); }
 
 }  // namespace
 
@@ -34,7 +34,7 @@ std::optional<FusionChannel> LocalMotion::choose(const Channels& channels, int64
     std::optional<FusionChannel> best;
     double best_error = 0.0;
     for (const FusionChannel c : {FusionChannel::kIns, FusionChannel::kVo, FusionChannel::kWheel}) {
-      const PoseChannel& channel = channels[at(c)];
+      const PoseChannel& channel = channels[index_of(c)];
       if ((c == FusionChannel::kIns && !with_ins) || channel.state(t_us) != least || !channel.has_lengths()) continue;
       double error = channel.expected_error(combined_.x(kSpeed));
       if (c == FusionChannel::kIns) error /= kInsAdvantage;
@@ -56,25 +56,26 @@ std::optional<FusionChannel> LocalMotion::witness(const Channels& channels, int6
 void LocalMotion::add(FusionChannel c, bool fresh, const Channels& channels, int64_t t_us) {
   const auto best = choose(channels, t_us, true, leader_);
   if (best != leader_) {
-    if (velocity_ && channels[at(*velocity_)].alive(t_us))
+    if (velocity_ && channels[index_of(*velocity_)].alive(t_us))
       pose_.carry(t_us, motion(channels, pose_.t_us(), t_us), channels);
     leader_ = best;
   }
   // An INS's velocity is the best, then the wheels'. Where nobody leads, the last one goes on.
   if (leader_) velocity_ = leader_;
   for (const FusionChannel v : {FusionChannel::kWheel, FusionChannel::kIns})
-    if (channels[at(v)].good(t_us)) velocity_ = v;
+    if (channels[index_of(v)].good(t_us)) velocity_ = v;
   if (!fresh) return;
   if (c == leader_) {
     pose_.carry(c, channels);
     led_us_ = t_us;
-    if (leader_ != FusionChannel::kIns || channels[at(c)].good(t_us)) attitude_ = channels[at(c)].odometry();
+    if (leader_ != FusionChannel::kIns || channels[index_of(c)].good(t_us))
+      attitude_ = channels[index_of(c)].odometry();
   }
   if (c == velocity_) update_modes(channels);
 }
 
 void LocalMotion::update_modes(const Channels& channels) {
-  const PoseChannel& channel = channels[at(*velocity_)];
+  const PoseChannel& channel = channels[index_of(*velocity_)];
   const int64_t t_us = channel.t_us();
   if (t_us < imm_us_) return;
   advance(imm_, config_.durations, config_.motion, seconds_between(imm_us_, t_us));
@@ -92,8 +93,8 @@ void LocalMotion::update_modes(const Channels& channels) {
 MotionStep LocalMotion::motion(const Channels& channels, int64_t from_us, int64_t to_us) const {
   const double dt = seconds_between(from_us, to_us);
   if (dt == 0.0) return {};
-  if (velocity_ && channels[at(*velocity_)].last_us()) {
-    const PoseChannel& channel = channels[at(*velocity_)];
+  if (velocity_ && channels[index_of(*velocity_)].last_us()) {
+    const PoseChannel& channel = channels[index_of(*velocity_)];
     if (channel.has_track(from_us) && from_us < channel.t_us()) {
       const int64_t known_us = std::min(to_us, channel.t_us());
       MotionSum sum;
@@ -126,7 +127,7 @@ Odometry LocalMotion::odometry(const Channels& channels, int64_t t_us) const {
 Odometry LocalMotion::attitude(const Channels& channels, int64_t t_us) const {
   Odometry o = attitude_;
   if (!velocity_) return o;
-  const PoseChannel& channel = channels[at(*velocity_)];
+  const PoseChannel& channel = channels[index_of(*velocity_)];
   const double length = velocity_ == FusionChannel::kIns ? 1.0 : channel.calibration().length();
   const double ahead = std::clamp(seconds_between(channel.t_us(), t_us), 0.0, kLongestPrediction);
   o.velocity = length * channel.odometry().velocity;

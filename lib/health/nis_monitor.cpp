@@ -12,7 +12,7 @@ namespace {
 
 /// A slow source is checked over this many, however old, up to the age below.
 constexpr std::size_t kMinMeasurements = 5;
-constexpr int64_t kMaxAge_us = 10'000'000;
+constexpr int64_t kOldestNis_us = 10'000'000;
 constexpr std::size_t kMaxMeasurements = 1000;
 /// Degrees of freedom below which a mean is too uncertain: at 10 a ratio of 5 is a chance of 1e-7.
 constexpr int kMinDof = 10;
@@ -39,7 +39,7 @@ void NisMonitor::add(int64_t now_us, double nis, int dof, bool accepted) {
   if (!fits) refused_us_ = now_us;
   if (fits && !accepted) return;
   measurements_.push_back({now_us, nis, dof, accepted});
-  while (measurements_.size() > kMaxMeasurements || now_us - measurements_.front().now_us > kMaxAge_us)
+  while (measurements_.size() > kMaxMeasurements || now_us - measurements_.front().now_us > kOldestNis_us)
     measurements_.pop_front();
 }
 
@@ -48,7 +48,7 @@ std::vector<NisMonitor::Measurement> NisMonitor::window(int64_t now_us) const {
   std::vector<Measurement> recent;
   for (auto measurement = measurements_.rbegin(); measurement != measurements_.rend(); ++measurement) {
     const int64_t age_us = now_us - measurement->now_us;
-    if (age_us > kMaxAge_us || (age_us > window_us && recent.size() >= kMinMeasurements)) break;
+    if (age_us > kOldestNis_us || (age_us > window_us && recent.size() >= kMinMeasurements)) break;
     recent.push_back(*measurement);
   }
   return recent;

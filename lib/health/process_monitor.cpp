@@ -15,7 +15,7 @@ constexpr double kEstablished = 2.0;         // s of heartbeats, after which an 
 constexpr double kHeartbeatIntervals = 2.5;  // intervals without a heartbeat
 constexpr double kMinSilence = 0.5;          // s, however fast it beats
 
-double seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
+double in_seconds(int64_t us) { return static_cast<double>(us) * 1e-6; }
 
 }  // namespace
 
@@ -50,14 +50,14 @@ void ProcessMonitor::change_run(int64_t now_us, int64_t run) {
 /// A process that beats fast is missed soon: by the longest of its last intervals, so that an early one does not count.
 double ProcessMonitor::silent_after() const {
   if (intervals_us_.size() < kIntervals) return limits_.heartbeat;
-  const double longest = seconds(*std::max_element(intervals_us_.begin(), intervals_us_.end()));
+  const double longest = in_seconds(*std::max_element(intervals_us_.begin(), intervals_us_.end()));
   return std::clamp(kHeartbeatIntervals * longest, std::min(kMinSilence, limits_.heartbeat), limits_.heartbeat);
 }
 
 /// A few heartbeats of a process that nobody expects may be forged, or of a test: it is not missed.
 bool ProcessMonitor::silent(int64_t now_us) const {
-  return newest_ && (expected_ || seconds(now_us_ - first_us_) > kEstablished) &&
-         seconds(now_us - now_us_) > silent_after();
+  return newest_ && (expected_ || in_seconds(now_us_ - first_us_) > kEstablished) &&
+         in_seconds(now_us - now_us_) > silent_after();
 }
 
 Condition ProcessMonitor::condition(const std::string& what, const std::string& text) const {
@@ -75,7 +75,7 @@ void ProcessMonitor::check(int64_t now_us, int64_t start_us, std::vector<Conditi
   }
   if (silent(now_us)) {
     out.push_back(
-        condition("silent", fmt::format("has shown no sign of life for {:.0f} s", seconds(now_us - now_us_))));
+        condition("silent", fmt::format("has shown no sign of life for {:.0f} s", in_seconds(now_us - now_us_))));
     return;
   }
   if (run_alternations_.within(now_us) > 0) out.push_back(condition("twice", "runs twice at once: end one of the two"));
@@ -104,7 +104,7 @@ ProcessReport ProcessMonitor::report(int64_t now_us) const {
   report.name = name_;
   report.newest = newest_;
   report.restarts = restarts_;
-  if (newest_) report.age_s = seconds(now_us - now_us_);
+  if (newest_) report.age_s = in_seconds(now_us - now_us_);
   report.silent = silent(now_us);
   return report;
 }

@@ -6,8 +6,8 @@
 namespace roadfix {
 namespace {
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr int kMaxTerms = 10000;
+constexpr double kRounding = std::numeric_limits<double>::epsilon();
+constexpr int kMaxFractions = 10000;
 
 /// Continued fraction of the incomplete beta function (Abramowitz, Stegun 1964, 26.5.8), evaluated by the modified
 /// Lentz method (Thompson, Barnett 1986); converges fast for x < (a + 1) / (a + b + 2).
@@ -17,7 +17,7 @@ double beta_fraction(double x, double a, double b) {
   double c = 1.0;
   double d = 1.0 / away(1.0 - (a + b) * x / (a + 1.0));
   double fraction = d;
-  for (int m = 1; m < kMaxTerms; ++m) {
+  for (int m = 1; m < kMaxFractions; ++m) {
     const double even = m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m));
     d = 1.0 / away(1.0 + even * d);
     c = away(1.0 + even / c);
@@ -26,7 +26,7 @@ double beta_fraction(double x, double a, double b) {
     d = 1.0 / away(1.0 + odd * d);
     c = away(1.0 + odd / c);
     fraction *= c * d;
-    if (std::abs(c * d - 1.0) < kEpsilon) break;
+    if (std::abs(c * d - 1.0) < kRounding) break;
   }
   return fraction;
 }
@@ -58,7 +58,7 @@ double student_t_quantile(double probability, double dof) {
   while (student_t_cdf(low, dof) > probability) low *= 2.0;
   while (true) {
     const double middle = 0.5 * (low + high);
-    if (middle <= low || middle >= high || high - low <= -4.0 * kEpsilon * low) return middle;
+    if (middle <= low || middle >= high || high - low <= -4.0 * kRounding * low) return middle;
     (student_t_cdf(middle, dof) > probability ? high : low) = middle;
   }
 }

@@ -12,15 +12,15 @@ using namespace wheel;  // indices of the error state
 namespace {
 
 constexpr double kStandingSpeedSigma = 1e-3;    ///< m/s
-constexpr double kUnknownTilt = 3.0 * kDegree;  ///< road cross fall and gradient, without an accelerometer
+constexpr double kTiltAtStart = 3.0 * kDegree;  ///< road cross fall and gradient, without an accelerometer
 constexpr double kStartMoved = 0.02;            ///< m, possible motion below the wheel speed threshold at a pull-away
 
 bool usable(const WheelSample& wheels) {
-  constexpr double kLargestSpeed = 150.0, kLargestRate = 35.0;  // m/s, rad/s: beyond any car
+  constexpr double kLargestSpeed = 150.0, kLargestYawRate = 35.0;  // m/s, rad/s: beyond any car
   if (wheels.num_speeds != 1 && wheels.num_speeds != 4) return false;
   for (int i = 0; i < wheels.num_speeds; ++i)
     if (!(std::abs(wheels.speeds[static_cast<std::size_t>(i)]) < kLargestSpeed)) return false;
-  return !wheels.yaw_rate || std::abs(*wheels.yaw_rate) < kLargestRate;
+  return !wheels.yaw_rate || std::abs(*wheels.yaw_rate) < kLargestYawRate;
 }
 
 }  // namespace
@@ -43,7 +43,7 @@ WheelInputStatus WheelOdometry::add(const WheelSample& wheels) {
     last_speed_ = motion.speed;
     if (imu_silent) {
       t_us_ = wheels.t_us;
-      start({0.0, 0.0}, kUnknownTilt);
+      start({0.0, 0.0}, kTiltAtStart);
     } else if (last_us) {
       align_by_accelerometer(rate);
     } else {
