@@ -1,4 +1,4 @@
-/// A start in motion by camera and imu alone, in a local frame, (N.7.12) to (N.7.14) of MODEL.md: the last seconds are gone
+/// A start in motion by camera and imu alone, in a local frame, (N.7.12) to (N.7.15) of MODEL.md: the last seconds are gone
 /// through by iterated smoothing, until the speed has settled.
 #pragma once
 
