@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "geodesy/gravity.h"
 #include "geometry/so3.h"
 
 namespace roadfix::navigation {
@@ -18,11 +19,10 @@ constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
 // How long a receiver takes to settle after it has lost all signals is nobody's promise: its loops pull in within a
 // second, its smoothing of codes by carriers (Hatch 1982) and its own filter within some. Prior: 0.75 to 8 s at one
 // standard deviation, and ten seconds later it may be another by a factor of 2.6.
-constexpr double kFadeTime = 2.5;        // s
-constexpr double kFadeSpread = 1.2;      // of the logarithm
-constexpr double kFadeWalk = 0.3;        // of the logarithm, 1/sqrt(s)
-constexpr double kEarthRate = 7.292e-5;  // rad/s (WGS84)
-constexpr double kHeadingTime = 30.0;    // s, in which a road turns by a radian
+constexpr double kFadeTime = 2.5;      // s
+constexpr double kFadeSpread = 1.2;    // of the logarithm
+constexpr double kFadeWalk = 0.3;      // of the logarithm, 1/sqrt(s)
+constexpr double kHeadingTime = 30.0;  // s, in which a road turns by a radian
 
 constexpr int kMostConsidered = 8;  // states: the receiver's and the imu's clocks, an antenna
 
