@@ -4,23 +4,20 @@
 #include <roadfix/image_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 
+#include "support/pull_away.h"
 #include "support/street.h"
 
 namespace roadfix::test {
 namespace {
 
-constexpr int64_t kFrame_us = 100'000, kImu_us = 10'000, kWheels_us = 20'000, kIns_us = 50'000;
+constexpr int64_t kFrame_us = 100'000, kWheels_us = 20'000, kIns_us = 50'000;
 constexpr int64_t kEnd_us = static_cast<int64_t>(kPictureDrive_s * 1e6);
-constexpr double kStand_s = 1.0, kAcceleration = 4.0, kSpeed = 6.0, kBaseline = 0.5, kGravity = 9.807;
+constexpr double kBaseline = 0.5;
+constexpr PullAway kCar{1.0, 4.0, 6.0};
 
 const CameraIntrinsics kLens{400, 136, 230.0, 230.0, 200.0, 68.0, Distortion::kNone, {}};
 
 double seconds(int64_t t_us) { return 1e-6 * static_cast<double>(t_us); }
-double speed_at(double t) { return std::clamp(kAcceleration * (t - kStand_s), 0.0, kSpeed); }
-double distance_at(double t) {
-  const double moving = std::max(0.0, t - kStand_s), rising = std::min(moving, kSpeed / kAcceleration);
-  return 0.5 * kAcceleration * rising * rising + kSpeed * (moving - rising);
-}
 
 image_t picture(const Street& street, double x, double way, unsigned seed) {
   image_t m{};
@@ -32,19 +29,11 @@ image_t picture(const Street& street, double x, double way, unsigned seed) {
   return m;
 }
 
-imu_t imu(int64_t t) {
-  imu_t m{};
-  m.accel_mps2[0] = (speed_at(seconds(t)) - speed_at(seconds(t - kImu_us))) / seconds(kImu_us);
-  m.accel_mps2[2] = kGravity;
-  m.gyro_radps[1] = 1e-4 * ((t / kImu_us) % 3 == 0 ? 1.0 : -0.5);  // no sensor is quite still
-  return m;
-}
-
 wheels_t wheels(int64_t t) {
   wheels_t m{};
   m.num_speeds = 1;
   m.direction = wheels_t::DIRECTION_SIGNED;
-  m.speed_mps[0] = speed_at(seconds(t));
+  m.speed_mps[0] = kCar.speed(seconds(t));
   return m;
 }
 
@@ -52,7 +41,7 @@ pose_t ins(int64_t t) {
   pose_t m{};
   m.q_wxyz[0] = 1.0;
   m.validity = pose_t::VALIDITY_VALID;
-  m.velocity_mps[0] = speed_at(seconds(t));
+  m.velocity_mps[0] = kCar.speed(seconds(t));
   for (int i = 0; i < 3; ++i) m.cov_velocity_m2ps2[i][i] = 0.01;
   return m;
 }
@@ -61,22 +50,22 @@ vo_restart_t restart() {
   vo_restart_t m{};
   m.restart_position_m[0] = 100.0;
   m.restart_q_wxyz[0] = 1.0;
-  m.restart_velocity_mps[0] = speed_at(1.15);
+  m.restart_velocity_mps[0] = kCar.speed(1.15);
   return m;
 }
 
 std::vector<DriveMessage> make() {
   std::vector<DriveMessage> all;
   const Street street(3);
-  for (int64_t t = 0; t < kEnd_us; t += kImu_us) {
+  for (int64_t t = 0; t < kEnd_us; t += PullAway::kImu_us) {
     const int64_t utime = kDriveStart_us + t;
-    all.push_back(drive_message("IMU", utime, t / kImu_us, imu(t)));
+    all.push_back(drive_message("IMU", utime, t / PullAway::kImu_us, kCar.imu(t)));
     if (t % kWheels_us == 0) all.push_back(drive_message("WHEELS", utime, t / kWheels_us, wheels(t)));
     if (t % kIns_us == 0) all.push_back(drive_message("POSE_INS", utime, t / kIns_us, ins(t)));
     if (t == 1'150'000) all.push_back(drive_message("VO_RESTART", utime, 0, restart()));
     if (t % kFrame_us != 0) continue;
     const int64_t i = t / kFrame_us;
-    const double way = distance_at(seconds(t));
+    const double way = kCar.distance(seconds(t));
     all.push_back(drive_message("CAMERA_LEFT", utime, i, picture(street, 0.0, way, static_cast<unsigned>(2 * i + 1))));
     all.push_back(
         drive_message("CAMERA_RIGHT", utime, i, picture(street, kBaseline, way, static_cast<unsigned>(2 * i + 2))));

@@ -7,6 +7,7 @@
 
 #include "geometry/determinism.h"
 #include "streams.h"
+#include "support/pull_away.h"
 #include "vo_tracker/handler.h"
 
 namespace roadfix {
@@ -14,17 +15,12 @@ namespace {
 
 using namespace test;
 
-constexpr int64_t kFrame_us = 100'000, kImu_us = 10'000, kEnd_us = 13'000'000;
-constexpr double kStand_s = 2.0, kAcceleration = 2.0, kSpeed = 4.0, kGravity = 9.807;
+constexpr int64_t kFrame_us = 100'000, kImu_us = PullAway::kImu_us, kEnd_us = 13'000'000;
+constexpr PullAway kCar{2.0, 2.0, 4.0};
 
 const CameraIntrinsics kLens{480, 160, 280.0, 280.0, 240.0, 80.0, Distortion::kNone, {}};
 
 double seconds(int64_t t_us) { return 1e-6 * static_cast<double>(t_us); }
-double speed_at(double t) { return std::clamp(kAcceleration * (t - kStand_s), 0.0, kSpeed); }
-double distance_at(double t) {
-  const double moving = std::max(0.0, t - kStand_s), rising = std::min(moving, kSpeed / kAcceleration);
-  return 0.5 * kAcceleration * rising * rising + kSpeed * (moving - rising);
-}
 
 Calibration calibration() {
   Calibration c;
@@ -46,20 +42,13 @@ std::vector<Sent> drive(int64_t late_us) {
     std::vector<image_t> all;
     const Street street(3);
     for (int64_t t = kFrame_us; t < kEnd_us; t += kFrame_us) {
-      const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, distance_at(seconds(t))}};
+      const SE3 left{Eigen::Quaterniond::Identity(), {0.0, 0.0, kCar.distance(seconds(t))}};
       all.push_back(picture_message(street.image(left, kLens, 2.0, static_cast<unsigned>(t / kFrame_us))));
     }
     return all;
   }();
   std::vector<Sent> all;
-  for (int64_t t = kImu_us; t < kEnd_us; t += kImu_us) {
-    imu_t m{};
-    const double dt = seconds(kImu_us);
-    m.accel_mps2[0] = (speed_at(seconds(t)) - speed_at(seconds(t - kImu_us))) / dt;
-    m.accel_mps2[2] = kGravity;
-    m.gyro_radps[1] = 1e-4 * ((t / kImu_us) % 3 == 0 ? 1.0 : -0.5);  // sensor noise
-    all.push_back(sent("IMU", t, t / kImu_us, m));
-  }
+  for (int64_t t = kImu_us; t < kEnd_us; t += kImu_us) all.push_back(sent("IMU", t, t / kImu_us, kCar.imu(t)));
   for (size_t i = 0; i < kPictures.size(); ++i) {
     const auto number = static_cast<int64_t>(i);
     all.push_back(sent("CAMERA_LEFT", kFrame_us * (number + 1), number, kPictures[i], (number % 3) * late_us / 2));
@@ -91,16 +80,17 @@ TEST_CASE("mode filter: valid while parked, then tracks the street") {
   REQUIRE(first != poses.end());
   CHECK(first->utime <= 1'000'000 + 200'000);  // the lateness of images is 200 ms
   for (const pose_t& p : poses) {
-    if (p.utime > first->utime && seconds(p.utime) < kStand_s) CHECK(std::abs(p.position_m[0]) < 0.01);
+    if (p.utime > first->utime && seconds(p.utime) < kCar.stand_s) CHECK(std::abs(p.position_m[0]) < 0.01);
     if (p.utime >= first->utime) CHECK(p.validity == pose_t::VALIDITY_VALID);
   }
   const pose_t& last = poses.back();
   CHECK(last.scale == pose_t::SCALE_METRIC);
   CHECK(last.origin == pose_t::ORIGIN_IMU);
-  CHECK(last.position_m[0] == Approx(distance_at(seconds(last.utime))).epsilon(0.03));
-  CHECK(last.velocity_mps[0] == Approx(kSpeed).epsilon(0.08));  // the scale is not observed yet, without turn and
-                                                                // wheels
-  CHECK(std::abs(last.velocity_mps[0] - kSpeed) < 4.0 * std::sqrt(last.cov_velocity_m2ps2[0][0]) + 0.1);
+  CHECK(last.position_m[0] == Approx(kCar.distance(seconds(last.utime))).epsilon(0.03));
+  CHECK(last.velocity_mps[0] ==
+        Approx(kCar.top_speed).epsilon(0.08));  // the scale is not observed yet, without turn and
+                                                // wheels
+  CHECK(std::abs(last.velocity_mps[0] - kCar.top_speed) < 4.0 * std::sqrt(last.cov_velocity_m2ps2[0][0]) + 0.1);
   CHECK(statuses.back().mode == vo_status_t::MODE_MSCKF);
   CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
   CHECK(statuses.back().scale_source == vo_status_t::SCALE_FROM_IMU);
