@@ -117,7 +117,8 @@ Eigen::Matrix3d PoseChannel::step_noise(double dt) const {
   q *= dt;
   q.head<2>() *= factors_(0);
   q(2) *= factors_(1);
-  if (channel_ == FusionChannel::kIns && last_) {
+  // What it claims counts of a filter, and of a witness that says that it is coasting: wheels without a yaw rate.
+  if (last_ && (channel_ == FusionChannel::kIns || last_->validity == Validity::kCoasting)) {
     // Its velocity's error lasts: as the white noise that displaces as much over twice that time.
     const double lasts = 2.0 * noise_.correlation * dt;
     for (int i = 0; i < 2; ++i) q(i) += lasts * last_->cov_velocity(i, i);

@@ -21,8 +21,14 @@ struct Outcome {
   double median_share = 0.0;   ///< end error over the way
 };
 
-/// `louder`: the witnesses' noise over what the configuration says, in the failover alone: nothing could show it.
-Outcome outcome(double louder, bool vision) {
+/// What happens to the witnesses in the failover alone.
+struct Loss {
+  double noise = 1.0;     ///< over what the configuration says: nothing could show it
+  double yaw_walk = 0.0;  ///< rad per sqrt(s): no yaw rate any more
+  bool told = false;      ///< they are coasting then, and claim that walk
+};
+
+Outcome outcome(const Loss& loss, bool vision) {
   ScenarioConfig s = scenario("city_loop");
   s.duration_s = 90.0;
   s.imu.rate_hz = s.wheels.rate_hz = s.gnss.rate_hz = 1.0;
@@ -45,12 +51,15 @@ Outcome outcome(double louder, bool vision) {
     wheels.step_sigma = 0.01 * std::sqrt(0.05);
     wheels.yaw_step = 2e-4 * std::sqrt(0.05);
     vo.step_share = wheels.step_share = 0.0;
-    if (louder != 1.0) {
+    if (loss.noise != 1.0 || loss.yaw_walk > 0.0) {
       RandomStream random(seed, 7);
       for (test::VoNoise* n : {&vo, &wheels}) {
-        n->fault = [&random, louder, lost, sigma = n->step_sigma, yaw = n->yaw_step](double t_s, Planar& motion) {
-          if (t_s > lost)
-            motion += louder * Planar(sigma * random.normal(), sigma * random.normal(), yaw * random.normal());
+        const double more = loss.noise == 1.0 ? 0.0 : loss.noise, walk = loss.yaw_walk / std::sqrt(n->rate_hz);
+        n->fault = [&random, more, walk, lost, sigma = n->step_sigma, yaw = n->yaw_step](double t_s, Planar& motion) {
+          if (t_s > lost) {
+            motion += more * Planar(sigma * random.normal(), sigma * random.normal(), yaw * random.normal());
+            if (walk > 0.0) motion.z() += walk * random.normal();
+          }
           return true;
         };
       }
@@ -61,6 +70,11 @@ Outcome outcome(double louder, bool vision) {
       streams.push_back(wheel_stream(drive, wheels, seed));
     }
     auto events = test::merged(streams);
+    for (test::StreamEvent& e : events) {
+      if (!loss.told || e.sample.channel == FusionChannel::kIns || t_of(e) <= lost) continue;
+      e.sample.odometry.validity = Validity::kCoasting;
+      e.sample.odometry.cov_pose(5, 5) += loss.yaw_walk * loss.yaw_walk * (t_of(e) - lost);
+    }
     std::erase_if(
         events, [&](const test::StreamEvent& e) { return e.sample.channel == FusionChannel::kIns && t_of(e) > lost; });
     Fusion fusion({});
@@ -92,7 +106,7 @@ Outcome outcome(double louder, bool vision) {
 }
 
 TEST_CASE("the failover's covariance is honest: vision and wheels") {
-  const Outcome o = outcome(1.0, true);
+  const Outcome o = outcome({}, true);
   CHECK(o.nees > 0.7);
   CHECK(o.nees < 1.3);
   CHECK(o.within_3sigma > 0.99);
@@ -100,14 +114,25 @@ TEST_CASE("the failover's covariance is honest: vision and wheels") {
 }
 
 TEST_CASE("the failover's covariance is honest: wheels alone") {
-  const Outcome o = outcome(1.0, false);
+  const Outcome o = outcome({}, false);
   CHECK(o.nees > 0.7);
   CHECK(o.nees < 1.3);
   CHECK(o.within_3sigma > 0.99);
 }
 
 TEST_CASE("teeth: witnesses whose noise grows threefold when nobody can show it are found out") {
-  CHECK(outcome(3.0, false).nees > 1.3);
+  CHECK(outcome({.noise = 3.0}, false).nees > 1.3);
+}
+
+TEST_CASE("wheels that lose their yaw rate and say so: the failover claims what they claim") {
+  const Outcome o = outcome({.yaw_walk = 0.01, .told = true}, false);
+  CHECK(o.nees > 0.7);
+  CHECK(o.nees < 1.3);
+  CHECK(o.within_3sigma > 0.99);
+}
+
+TEST_CASE("teeth: wheels that lose their yaw rate and do not say so are found out") {
+  CHECK(outcome({.yaw_walk = 0.01}, false).nees > 3.0);
 }
 
 }  // namespace
