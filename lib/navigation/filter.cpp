@@ -307,7 +307,7 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
 
 std::optional<StepDetector::Step> Filter::mend_step(double sigmas, bool displaced) {
   if (!steps_.take_fresh() || !steps_.most_likely(sigmas, displaced)) {
-    steps_.advance(state_, motion_);
+    steps_.advance(state_, motion_, displaced);
     return std::nullopt;
   }
   flush();

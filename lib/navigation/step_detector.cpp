@@ -94,9 +94,10 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
 }
 
 /// Two moments per octave: of one second the first two take turns, of two seconds the next two, ...
-void StepDetector::advance(State& state, const BodyMotion& motion) {
+void StepDetector::advance(State& state, const BodyMotion& motion, bool displaced) {
   const int64_t t_us = state.x.t_us;
   if (!watches_ || t_us < next_us_) return;
+  if (displaced) begin(state, motion, kStart);
   next_us_ = t_us + kApart_us;
   ++turn_;
   for (int octave = 0; octave < kMoments / 2; ++octave) {
@@ -176,7 +177,7 @@ std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool 
   std::array<Fit, kBlocks.size()> fits;
   size_t best = 0;
   for (size_t k = 0; k < kBlocks.size(); ++k) {
-    if (displaced && kBlocks[k].kind == StepKind::kReceiver) continue;
+    if (displaced && (kBlocks[k].kind == StepKind::kReceiver || kBlocks[k].kind == StepKind::kLeverArm)) continue;
     fits[k] = best_of(kBlocks[k].first, kBlocks[k].size);
     fits[k].log_odds -= kBlocks[k].rarity;
     if (fits[k].log_odds > fits[best].log_odds) best = k;

@@ -59,8 +59,9 @@ class StepDetector {
   void begin(State& state, const BodyMotion& motion);
   void stop() { watches_ = false; }
   [[nodiscard]] bool watches() const { return watches_; }
-  /// Often: the oldest of the recent moments are replaced by now.
-  void advance(State& state, const BodyMotion& motion);
+  /// Often: the oldest of the recent moments are replaced by now. `displaced`: the receiver is known to be, and what it says
+  /// tells nothing of where its antenna is.
+  void advance(State& state, const BodyMotion& motion, bool displaced);
 
   /// The filter's covariance step over T s.
   void move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
@@ -85,7 +86,8 @@ class StepDetector {
   }
 
   /// The step that explains most, unless chance does at this many sigmas, something else makes the innovations large, or
-  /// another kind explains as much. `displaced`: the receiver is known to be, and its steps are the filter's to follow.
+  /// another kind explains as much. `displaced`: the receiver is known to be: its steps are the filter's to follow, and
+  /// its antenna is asked for no place.
   [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced) const;
   /// (N.5.11): a receiver that is dragged off along the way looks like its clock at first. Where `step` shows it
   /// displaced: the column of that clock, and the sum of its steps of the last 16 s, s.
