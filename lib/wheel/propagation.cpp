@@ -1,5 +1,6 @@
 #include "wheel/propagation.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/so3.h"
@@ -9,6 +10,9 @@ namespace roadfix {
 
 using namespace wheel;  // indices of the error state
 namespace {
+
+constexpr double kUncorrectedDisturbance = 3.0;  ///< m/s2 per sqrt(Hz): 1.5 m/s2 over 2 s, vehicle acceleration
+                                                 ///< not corrected
 
 Eigen::Vector3d body_rate(const WheelVector& x, const Eigen::Vector3d& gyro) {
   Eigen::Vector3d omega = gyro - x.segment<3>(kGyroBias);
@@ -122,6 +126,16 @@ void add_speed_noise(WheelState& state, const WheelStep& step, double density) {
 }
 
 }  // namespace
+
+WheelNoise process_noise(const WheelConfig& config) {
+  const WheelSensors& s = config.sensors;
+  const WheelTuning& t = config.tuning;
+  WheelNoise noise{s.gyro_noise,     std::hypot(s.accel_noise, t.accel_disturbance),
+                   s.gyro_bias_walk, s.accel_bias_walk,
+                   t.sideslip_noise, t.heave_noise};
+  if (!t.correct_acceleration) noise.accel = std::max(noise.accel, kUncorrectedDisturbance);
+  return noise;
+}
 
 WheelVector propagated_mean(const WheelVector& x, const WheelStep& step) {
   const Eigen::Vector3d rates = euler_rates({x(kRoll), x(kPitch)}, body_rate(x, step.gyro));

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "wheel/dead_reckoning.h"
+#include "wheel/wheel_config.h"
 #include "wheel/wheel_state.h"
 
 namespace roadfix {
@@ -37,6 +38,9 @@ struct WheelNoise {
   double sideslip = 0.0;    ///< rad per sqrt(Hz), direction of travel, lateral
   double heave = 0.0;       ///< rad per sqrt(Hz), direction of travel, vertical
 };
+
+/// With an IMU; the acceleration of the vehicle is noise of the accelerometer where it is not corrected.
+WheelNoise process_noise(const WheelConfig& config);
 
 /// Normal gravity differs by 0.5 % between equator and pole, 0.05 m/s2: covered by the accelerometer bias.
 inline constexpr double kStandardGravity = 9.80665;

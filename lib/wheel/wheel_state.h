@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cstdint>
 
 #include "wheel/tilt.h"
 
@@ -31,6 +32,7 @@ using WheelCovariance = Eigen::Matrix<double, wheel::kWheelStates, wheel::kWheel
 using WheelVector = Eigen::Matrix<double, wheel::kWheelStates, 1>;
 
 struct WheelState {
+  int64_t t_us = 0;
   WheelVector x = WheelVector::Zero();
   WheelCovariance P = WheelCovariance::Zero();
 
