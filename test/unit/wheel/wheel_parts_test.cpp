@@ -1,0 +1,168 @@
+// The parts of the wheel odometry, each alone.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "wheel/initial_alignment.h"
+#include "wheel/propagation.h"
+#include "wheel/speed_update.h"
+#include "wheel/yaw_rate_source.h"
+#include "wheel/zero_rate_update.h"
+
+namespace roadfix {
+
+using namespace wheel;  // indices of the error state
+namespace {
+
+TEST_CASE("speeds in steps have the noise of their rounding, others none") {
+  for (const double step : {0.0, 0.06}) {
+    WheelSpeedNoise noise(0.03);
+    for (int i = 0; i < 200; ++i) {
+      const double speed = 10.0 + 3.0 * std::sin(0.1 * i);
+      noise.observe(step > 0.0 ? step * std::round(speed / step) : speed);
+    }
+    CAPTURE(step);
+    CHECK(noise.of_one() == Approx(std::hypot(0.03, step / std::sqrt(12.0))).epsilon(1e-3));
+    // Of twenty samples a second, one carries a twentieth of what a second tells of the rounding error.
+    CHECK(noise.of_many(0.05) == Approx(std::hypot(0.03, step * std::sqrt(20.0 / 12.0))).epsilon(2e-3));
+    CHECK(noise.of_many(5.0) == noise.of_one());
+  }
+}
+
+/// A state at 10 m/s, known to 0.1 m/s, of a calibrated wheel scale.
+WheelState moving() {
+  WheelState state;
+  state.x(kSpeed) = 10.0;
+  decouple(state.P, kSpeed, 0.1);
+  return state;
+}
+
+TEST_CASE("a wheel speed corrects the speed, slip does not, until it has lasted too long for slip") {
+  const WheelConfig config;
+  WheelSpeedUpdate update(config);
+  WheelState state = moving();
+  CHECK(update.update(state, {0, 10.1}, 0.0, 0.05) == WheelInputStatus::kUsed);
+  CHECK(state.x(kSpeed) > 10.05);
+  CHECK_FALSE(update.slipping());
+
+  const double before = state.x(kSpeed);
+  CHECK(update.update(state, {50'000, 14.0}, 0.0, 0.05) == WheelInputStatus::kSlip);
+  CHECK(update.slipping());
+  CHECK(state.x(kSpeed) == before);
+  const auto later_us = static_cast<int64_t>(1e6 * config.tuning.slip_timeout) + 100'000;
+  state.t_us = later_us;
+  CHECK(update.update(state, {later_us, 14.0}, 0.0, 0.05) == WheelInputStatus::kUsed);
+  CHECK_FALSE(update.slipping());
+  CHECK(state.x(kSpeed) == Approx(14.0).margin(0.1));
+}
+
+TEST_CASE("the state is older than the wheel speed by the acceleration in between") {
+  WheelSpeedUpdate update(WheelConfig{});
+  WheelState state = moving();
+  CHECK(update.update(state, {100'000, 10.2}, 2.0, 0.05) == WheelInputStatus::kUsed);
+  CHECK(state.x(kSpeed) == Approx(10.0).margin(1e-12));
+}
+
+TEST_CASE("a magnitude has the sign of the predicted speed, and none while it is undecided") {
+  WheelSpeedUpdate update(WheelConfig{});
+  WheelState state = moving();
+  state.x(kSpeed) = -5.0;
+  const WheelSpeed z{0, 5.0, true};
+  CHECK(update.sign_unknown(z));
+  CHECK(update.update(state, z, 0.0, 0.05) == WheelInputStatus::kUsed);
+  CHECK(update.signed_speed(z) == -5.0);
+  update.forget_direction();
+  state.x(kSpeed) = 0.0;
+  decouple(state.P, kSpeed, 10.0);
+  CHECK(update.update(state, z, 0.0, 0.05) == WheelInputStatus::kNoDirection);
+  CHECK(update.signed_speed(z) == 5.0);
+  CHECK(state.x(kSpeed) == 0.0);
+}
+
+TEST_CASE("the bias about z belongs to the selected source of yaw rate") {
+  WheelConfig config;
+  YawRateSource source(config);
+  WheelState state;
+  state.x(kGyroBias + 2) = 0.01;
+  decouple(state.P, kGyroBias + 2, 1e-4);
+  const Eigen::Vector3d gyro(0.1, 0.2, 0.3);
+  source.select_with_imu(state);
+  CHECK(state.x(kGyroBias + 2) == 0.01);
+  CHECK(source.rate(gyro) == gyro);
+
+  source.select_without_imu(state);  // nor wheels
+  CHECK_FALSE(source.known());
+  CHECK(source.is_gyro());
+
+  WheelMotion motion;
+  motion.sides_yaw_rate = 0.5;
+  source.add(motion);
+  source.select_without_imu(state);
+  CHECK(source.known());
+  CHECK(source.rate(gyro) == Eigen::Vector3d(0.1, 0.2, 0.5));
+  CHECK(state.x(kGyroBias + 2) == 0.0);
+  CHECK(state.sigma(kGyroBias + 2) == Approx(config.sensors.wheel_yaw_bias_std));
+
+  motion.sensor_yaw_rate = 0.4;  // the vehicle's own sensor comes before its wheels
+  source.add(motion);
+  CHECK(source.rate(gyro).z() == 0.4);
+  source.select_with_imu(state);
+  CHECK(source.rate(gyro) == gyro);
+  CHECK(state.sigma(kGyroBias + 2) == Approx(config.sensors.gyro_bias_std));
+}
+
+/// Means of one axis' rate at standstill over 20 s, the prior sigma of the bias as given.
+WheelState stood(double rate, double prior, ZeroRateUpdate& update) {
+  WheelState state;
+  for (int i = 0; i < 3; ++i) decouple(state.P, kGyroBias + i, prior);
+  update.begin();
+  for (int i = 0; i < 2000; ++i) update.add(state, 0.01, Eigen::Vector3d(0.0, 0.0, rate));
+  return state;
+}
+
+TEST_CASE("at standstill the mean rate is the bias, unless it is beyond any plausible one") {
+  ZeroRateUpdate update(2e-4);
+  const WheelState bias = stood(0.002, 2e-3, update);
+  CHECK(bias.x(kGyroBias + 2) == Approx(0.002).epsilon(1e-3));
+  CHECK_FALSE(update.turning());
+  const WheelState turntable = stood(0.02, 2e-3, update);
+  CHECK(turntable.x(kGyroBias + 2) == 0.0);
+  CHECK(update.turning());
+  update.begin();
+  CHECK_FALSE(update.turning());
+}
+
+TEST_CASE("the alignment levels by the force less the acceleration of the wheels") {
+  const WheelConfig config;
+  InitialAlignment alignment(config);
+  ImuIntegral half;  // braking by 2 m/s2, nose down by 0.02 rad, half of what is needed
+  half.time = 0.5 * config.tuning.align_time;
+  half.force = half.time * Eigen::Vector3d(-2.0 - 0.02 * kStandardGravity, 0.0, kStandardGravity);
+  alignment.add(half, 10.0, -2.0);
+  CHECK_FALSE(alignment.complete());
+  alignment.add(half, 10.0, -2.0);
+  REQUIRE(alignment.complete());
+  const WheelState first = alignment.levelled(7, {10.0});
+  CHECK(first.t_us == 7);
+  CHECK(first.x(kPitch) == Approx(0.02).epsilon(1e-3));
+  CHECK(first.x(kRoll) == Approx(0.0).margin(1e-9));
+  CHECK(first.x(kSpeed) == 10.0);
+  CHECK(first.sigma(kSpeed) < 0.2);
+  CHECK(alignment.levelled(7, {10.0, true}).sigma(kSpeed) > 20.0);  // it may be -10 m/s
+  CHECK(alignment.level(7, {10.0}).sigma(kPitch) > 2.9 * kDegree);
+}
+
+TEST_CASE("a remembered gyro bias starts with its sigma and the change between two starts") {
+  const WheelConfig config;
+  InitialAlignment alignment(config);
+  const double spread = config.sensors.gyro_bias_std;
+  alignment.restore({Eigen::Vector3d::Constant(NAN), Eigen::Vector3d::Zero()});
+  CHECK(alignment.level(0, {}).sigma(kGyroBias) == Approx(spread));
+  alignment.restore({Eigen::Vector3d(1e-3, 2e-3, 3e-3), Eigen::Vector3d::Zero()});
+  const WheelState first = alignment.level(0, {});
+  CHECK(first.x.segment<3>(kGyroBias) == Eigen::Vector3d(1e-3, 2e-3, 3e-3));
+  CHECK(first.sigma(kGyroBias) < 0.5 * spread);
+  CHECK(first.sigma(kGyroBias) > 0.2 * spread);
+}
+
+}  // namespace
+}  // namespace roadfix
