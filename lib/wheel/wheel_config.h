@@ -56,9 +56,7 @@ struct WheelTuning {
   double mag_interval = 10.0;        ///< s, correlation time of the heading error: one measurement is used per interval
   double mag_gate = 0.1;            ///< relative change of field strength, and of dip in rad, beyond which a heading is
                                     ///< rejected
-  double standing_speed = 0.15;     ///< m/s, standstill: wheel speed below this ...
-  double standing_rate = 0.02;      ///< rad/s, and change of the angular rate below this ...
-  double standing_after = 0.6;      ///< s, for this long
+  double standing_speed = 0.15;     ///< m/s, below which wheels may stand
   double align_time = 0.5;          ///< s, accelerometer mean before the first pose
   double slip_gate = 5.0;           ///< sigma, innovation gate of the wheel speed
   double slip_timeout = 3.0;        ///< s of consecutive rejections after which the wheel speed is accepted again
@@ -95,8 +93,6 @@ void visit(WheelTuning& c, Visitor& v) {
   v.number("mag_interval_s", c.mag_interval, 0.0, 1000.0);
   v.number("mag_gate", c.mag_gate, 0.001, 10.0);
   v.number("standing_speed_mps", c.standing_speed, 0.0, 2.0);
-  v.number("standing_rate_radps", c.standing_rate, 0.0, 1.0);
-  v.number("standing_after_s", c.standing_after, 0.0, 60.0);
   v.number("align_time_s", c.align_time, 0.0, 60.0);
   v.number("slip_gate", c.slip_gate, 1.0, 1000.0);
   v.number("slip_timeout_s", c.slip_timeout, 0.0, 60.0);

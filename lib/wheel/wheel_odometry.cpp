@@ -58,7 +58,7 @@ WheelInputStatus WheelOdometry::add(const ImuSample& imu) {
   yaw_rate_.select_with_imu(state_);
   levelling_.add(imu, dt);
   propagate_by_imu(imu, before.gyro);
-  standstill_.add_rate(state_, dt, imu.gyro, yaw_rate_.rate(imu.gyro));
+  standstill_.add_imu(state_, imu, dt, yaw_rate_.rate(imu.gyro));
   if (!config_.tuning.correct_acceleration) levelling_.add_uncorrected(state_, imu.gyro, levelling_motion());
   return WheelInputStatus::kUsed;
 }
@@ -85,7 +85,6 @@ WheelInputStatus WheelOdometry::align(const ImuSample& imu) {
   if (imu_.t_us) levelling_.add(imu, std::min(seconds_between(*imu_.t_us, imu.t_us), config_.tuning.imu_timeout));
   imu_ = {imu.t_us, imu.gyro};
   state_.t_us = imu.t_us;
-  standstill_.set_rate(imu.gyro);
   return WheelInputStatus::kAligning;
 }
 

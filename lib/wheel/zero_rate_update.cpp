@@ -5,7 +5,6 @@ namespace roadfix {
 using namespace wheel;  // indices of the error state
 namespace {
 
-constexpr double kBiasBlock = 1.0;      ///< s of gyro mean per bias update
 constexpr double kFirstBiasGate = 6.6;  ///< squared sigma, 99 %, first mean of a standstill: beyond it the vehicle
                                         ///< turns
 constexpr double kBiasGate = 25.0;      ///< squared sigma, later means, of which there may be hundreds
@@ -18,17 +17,8 @@ void ZeroRateUpdate::begin() {
   turning_ = tested_ = false;
 }
 
-void ZeroRateUpdate::add(WheelState& state, double dt_s, const Eigen::Vector3d& gyro) {
-  angle_ += dt_s * gyro;
-  time_ += dt_s;
-  if (time_ < kBiasBlock) return;
-  update(state);
-  tested_ = true;
-  angle_.setZero();
-  time_ = 0.0;
-}
-
 void ZeroRateUpdate::update(WheelState& state) {
+  if (time_ <= 0.0) return;
   const double variance = gyro_noise_ * gyro_noise_ / time_;
   const Eigen::Vector3d difference = angle_ / time_ - state.x.segment<3>(kGyroBias);
   for (int i = 0; i < 3; ++i) {
@@ -40,6 +30,9 @@ void ZeroRateUpdate::update(WheelState& state) {
     H(kGyroBias + i) = 1.0;
     schmidt_update(state, H, d, variance, {kGyroBias + i});
   }
+  tested_ = true;
+  angle_.setZero();
+  time_ = 0.0;
 }
 
 }  // namespace roadfix

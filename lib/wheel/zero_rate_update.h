@@ -13,8 +13,13 @@ class ZeroRateUpdate {
 
   /// A standstill begins.
   void begin();
-  /// A rate (rad/s, raw) of dt_s at standstill; each kBiasBlock its mean updates the bias.
-  void add(WheelState& state, double dt_s, const Eigen::Vector3d& gyro);
+  /// A rate (rad/s, raw) of dt_s at standstill.
+  void add(double dt_s, const Eigen::Vector3d& gyro) {
+    angle_ += dt_s * gyro;
+    time_ += dt_s;
+  }
+  /// Updates the bias by the mean since the last update.
+  void update(WheelState& state);
   /// The wheels stand, but the rate about z exceeds any plausible gyro bias (turntable, ferry).
   [[nodiscard]] bool turning() const { return turning_; }
 
@@ -24,8 +29,6 @@ class ZeroRateUpdate {
   }
 
  private:
-  void update(WheelState& state);
-
   double gyro_noise_;
   bool turning_ = false;
   bool tested_ = false;                              ///< by the first mean of this standstill

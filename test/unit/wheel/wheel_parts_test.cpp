@@ -5,6 +5,7 @@
 #include "wheel/initial_alignment.h"
 #include "wheel/propagation.h"
 #include "wheel/speed_update.h"
+#include "wheel/standstill.h"
 #include "wheel/yaw_rate_source.h"
 #include "wheel/zero_rate_update.h"
 
@@ -115,7 +116,10 @@ WheelState stood(double rate, double prior, ZeroRateUpdate& update) {
   WheelState state;
   for (int i = 0; i < 3; ++i) decouple(state.P, kGyroBias + i, prior);
   update.begin();
-  for (int i = 0; i < 2000; ++i) update.add(state, 0.01, Eigen::Vector3d(0.0, 0.0, rate));
+  for (int i = 0; i < 2000; ++i) {
+    update.add(0.01, Eigen::Vector3d(0.0, 0.0, rate));
+    if (i % 50 == 49) update.update(state);
+  }
   return state;
 }
 
@@ -129,6 +133,48 @@ TEST_CASE("at standstill the mean rate is the bias, unless it is beyond any plau
   CHECK(update.turning());
   update.begin();
   CHECK_FALSE(update.turning());
+}
+
+/// Whether a second of wheels at rest is a standstill, the gyro's rate about z as given, a sample each 10 ms.
+template <class Rate>
+bool stands(const Rate& rate) {
+  Standstill standstill((WheelConfig()));
+  WheelState state = moving();
+  for (int i = 0; i <= 130; ++i) {
+    ImuSample imu;
+    imu.t_us = 10'000 * i;
+    imu.gyro.z() = rate(0.01 * i);
+    imu.accel.z() = kStandardGravity;
+    standstill.add_imu(state, imu, 0.01, imu.gyro);
+    if (i % 5 == 0) standstill.add_speed(state, imu.t_us, 0.0, true);
+  }
+  CHECK(standstill.standing() == (state.sigma(kSpeed) == 0.0));
+  return standstill.standing();
+}
+
+TEST_CASE("wheels stand where the rate is constant, and not while it changes") {
+  CHECK(stands([](double) { return 0.0; }));
+  CHECK(stands([](double) { return 0.2; }));  // any bias
+  CHECK_FALSE(stands([](double t) { return 0.3 * t; }));
+}
+
+TEST_CASE("a standstill begins after half a second of trusted zero speed and ends with the first motion") {
+  const WheelConfig config;
+  Standstill standstill(config);
+  WheelState state = moving();
+  CHECK_FALSE(standstill.add_speed(state, 0, 0.0, true));
+  CHECK_FALSE(standstill.add_speed(state, 400'000, 0.0, true));
+  CHECK(standstill.add_speed(state, 500'000, 0.0, true));
+  CHECK(state.x(kSpeed) == 0.0);
+  CHECK(state.sigma(kSpeed) == 0.0);
+  CHECK_FALSE(standstill.add_speed(state, 600'000, 0.0, true));
+  CHECK(standstill.standing());
+  CHECK_FALSE(standstill.add_speed(state, 700'000, 2.0 * config.tuning.standing_speed, true));
+  CHECK_FALSE(standstill.standing());
+  CHECK(state.sigma(kSpeed) == Approx(config.tuning.standing_speed));
+  CHECK(state.sigma(kPos) > 0.0);
+  for (const int64_t t_us : {800'000, 1'400'000}) standstill.add_speed(state, t_us, 0.0, false);
+  CHECK_FALSE(standstill.standing());  // locked wheels
 }
 
 TEST_CASE("the alignment levels by the force less the acceleration of the wheels") {
