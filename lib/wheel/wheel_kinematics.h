@@ -32,8 +32,9 @@ struct WheelMotion {
   std::optional<double> sensor_yaw_rate;  ///< rad/s, of the vehicle's own sensor
 };
 
-/// Speed and yaw rate of one sample (W.3.2), (W.3.3), Ock et al. 2020 (9). Direction kReverse negates the speeds and
-/// the yaw rate from them; kUnknown gives no yaw rate from the wheels.
-WheelMotion wheel_motion(const WheelSample& sample, std::optional<double> track_width_m, SideRule rule);
+/// Speed and yaw rate of one sample (W.3.2), (W.3.3), Ock et al. 2020 (9), by vehicle::axle_speed. Direction kReverse
+/// negates the speeds and the yaw rate from them; kUnknown gives no yaw rate from the wheels. No value where a speed is
+/// no car's, or their number is neither one nor four.
+std::optional<WheelMotion> wheel_motion(const WheelSample& sample, std::optional<double> track_width_m, SideRule rule);
 
 }  // namespace roadfix

@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kLargestRate = 35.0;         ///< rad/s, full scale of automotive gyros, beyond any car
 constexpr double kLargestForce = 400.0;       ///< m/s2, full scale of accelerometers
-constexpr double kLargestSpeed = 150.0;       ///< m/s, beyond any car
 constexpr double kUnknownAcceleration = 1.5;  ///< m/s2 per sqrt(Hz): 1.5 m/s2 for a second
 constexpr double kUnknownRate = 0.1;          ///< rad/s per sqrt(Hz): a street corner within a few seconds
 constexpr double kTurnDuration = 3.0;    ///< s, typical duration of a turn, for the error of an uncertain lever arm
@@ -24,13 +23,6 @@ constexpr double kLostYawSigma = 0.8;    ///< rad: the yaw is lost
 bool usable(const ImuSample& imu) {
   return imu.gyro.cwiseAbs().maxCoeff() < kLargestRate && imu.accel.cwiseAbs().maxCoeff() < kLargestForce &&
          imu.gyro.allFinite() && imu.accel.allFinite();
-}
-
-bool usable(const WheelSample& wheels) {
-  if (wheels.num_speeds != 1 && wheels.num_speeds != 4) return false;
-  for (int i = 0; i < wheels.num_speeds; ++i)
-    if (!(std::abs(wheels.speeds[static_cast<std::size_t>(i)]) < kLargestSpeed)) return false;
-  return !wheels.yaw_rate || std::abs(*wheels.yaw_rate) < kLargestRate;
 }
 
 }  // namespace
@@ -64,12 +56,12 @@ WheelInputStatus WheelOdometry::add(const ImuSample& imu) {
 }
 
 WheelInputStatus WheelOdometry::add(const WheelSample& wheels) {
-  if (!usable(wheels)) return WheelInputStatus::kBadValue;
+  const std::optional<WheelMotion> motion = wheel_motion(wheels, config_.sensors.track_width, config_.tuning.side_rule);
+  if (!motion || (wheels.yaw_rate && !(std::abs(*wheels.yaw_rate) < kLargestRate))) return WheelInputStatus::kBadValue;
   if (wheels_.t_us && wheels.t_us <= *wheels_.t_us) return WheelInputStatus::kOld;
   if (!first_wheels_us_) first_wheels_us_ = wheels.t_us;
-  const WheelMotion motion = wheel_motion(wheels, config_.sensors.track_width, config_.tuning.side_rule);
-  const WheelSpeed z{wheels.t_us, motion.speed, wheels.direction == WheelDirection::kUnknown};
-  yaw_rate_.add(motion);
+  const WheelSpeed z{wheels.t_us, motion->speed, wheels.direction == WheelDirection::kUnknown};
+  yaw_rate_.add(*motion);
   speed_.observe(z);
   return started_ ? update(z) : align(z);
 }
