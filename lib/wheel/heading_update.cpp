@@ -1,5 +1,6 @@
 #include "wheel/heading_update.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/frames.h"
@@ -9,11 +10,6 @@
 namespace roadfix {
 
 using namespace wheel;  // indices of the error state
-namespace {
-
-constexpr double kMicrotesla = 1e-6;  ///< T
-
-}  // namespace
 
 bool HeadingUpdate::due(int64_t t_us, bool standing) const {
   if (!last_us_) return true;
@@ -24,7 +20,7 @@ WheelInputStatus HeadingUpdate::update(WheelState& state, const MagSample& mag, 
   const WheelTuning& t = config_.tuning;
   if (!due(mag.t_us, standing)) return WheelInputStatus::kNotDue;
   const Tilt tilt = state.tilt();
-  const Eigen::Vector3d field = config_.sensors.soft_iron * (mag.field - kMicrotesla * config_.sensors.hard_iron_ut);
+  const Eigen::Vector3d field = config_.sensors.soft_iron * (mag.field - config_.sensors.hard_iron);
   const Eigen::Vector3d level = level_field(field, tilt.roll, tilt.pitch);
   const std::optional<MagneticYaw> measured = magnetic_yaw(field, tilt.roll, tilt.pitch);
   if (!measured) return WheelInputStatus::kBadValue;
@@ -34,7 +30,8 @@ WheelInputStatus HeadingUpdate::update(WheelState& state, const MagSample& mag, 
     dip_ = dip;
     state.x(kMagOffset) = wrap_angle(measured->yaw - state.x(kYaw));
     decouple(state.P, kMagOffset, kPi);  // the update below reduces it to the noise of the heading and the yaw
-  } else if (std::abs(strength / strength_ - 1.0) > t.mag_gate || std::abs(dip - dip_) > t.mag_gate) {
+  } else if (std::max(std::abs(strength / strength_ - 1.0), std::abs(dip - dip_)) > 2.0 * t.mag_noise) {
+    // Two sigma: a disturbance changes strength (relative) and dip (rad) by about as much as the heading.
     return WheelInputStatus::kGated;
   }
   WheelVector H = WheelVector::Zero();

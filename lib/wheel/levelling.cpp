@@ -11,8 +11,6 @@ using namespace wheel;  // indices of the error state
 namespace {
 
 constexpr double kUncorrectedLevelling = 0.05;  ///< s of specific force per tilt correction without wheels
-constexpr double kSpeedRateNoise = 0.2;         ///< m/s2, wheel noise admitted in one tilt correction, a fifth of its
-                                                ///< gate
 
 }  // namespace
 
@@ -31,7 +29,7 @@ void Levelling::add(WheelState& state, const LevellingPoint& now, const Levellin
   if (motion.slipping) reset();
   if (begin_.t_us) {
     const double dt = seconds_between(*begin_.t_us, *now.t_us);
-    if (dt < std::sqrt(2.0) * motion.speed_sigma / kSpeedRateNoise) return;
+    if (dt < std::sqrt(2.0) * motion.speed_sigma / (0.2 * config_.tuning.tilt_gate)) return;  // five sigma in the gate
     correct(state, now.gyro, (now.speed - begin_.speed) / dt, motion);
     reset();
   }

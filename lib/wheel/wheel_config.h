@@ -31,7 +31,7 @@ struct WheelSensors {
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();      ///< m, IMU axes: lever arm of the rear-axle centre
   Eigen::Vector3d p_imu_axle_std = Eigen::Vector3d::Zero();  ///< m
   std::optional<double> track_width;                         ///< m
-  Eigen::Vector3d hard_iron_ut = Eigen::Vector3d::Zero();    ///< uT, subtracted from the field first
+  Eigen::Vector3d hard_iron = Eigen::Vector3d::Zero();       ///< T, subtracted from the field first
   Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();   ///< applied after the hard-iron correction
 };
 
@@ -54,17 +54,15 @@ struct WheelTuning {
   double heave_noise = 2e-3;         ///< rad per sqrt(Hz), the same, vertical (suspension)
   double mag_noise = 0.05;           ///< rad, of one heading measurement
   double mag_interval = 10.0;        ///< s, correlation time of the heading error: one measurement is used per interval
-  double mag_gate = 0.1;            ///< relative change of field strength, and of dip in rad, beyond which a heading is
-                                    ///< rejected
-  double standing_speed = 0.15;     ///< m/s, below which wheels may stand
-  double align_time = 0.5;          ///< s, accelerometer mean before the first pose
-  double slip_gate = 5.0;           ///< sigma, innovation gate of the wheel speed
-  double slip_timeout = 3.0;        ///< s of consecutive rejections after which the wheel speed is accepted again
-  double direction_evidence = 6.0;  ///< log-likelihood ratio that decides between forward and reverse
-  double direction_timeout = 2.0;   ///< s after which forward is assumed and reported
-  double imu_timeout = 0.1;         ///< s without IMU after which the wheels alone propagate the state
-  double wheel_timeout = 0.5;       ///< s without wheels after which the pose is coasting
-  double restart_gap = 5.0;         ///< s without any input after which the reset counter increases
+  double standing_speed = 0.15;      ///< m/s, below which wheels may stand
+  double align_time = 0.5;           ///< s, accelerometer mean before the first pose
+  double slip_gate = 5.0;            ///< sigma, innovation gate of the wheel speed
+  double slip_timeout = 3.0;         ///< s of consecutive rejections after which the wheel speed is accepted again
+  double direction_evidence = 6.0;   ///< log-likelihood ratio that decides between forward and reverse
+  double direction_timeout = 2.0;    ///< s after which forward is assumed and reported
+  double imu_timeout = 0.1;          ///< s without IMU after which the wheels alone propagate the state
+  double wheel_timeout = 0.5;        ///< s without wheels after which the pose is coasting
+  double restart_gap = 5.0;          ///< s without any input after which the reset counter increases
 };
 
 struct WheelConfig {
@@ -91,7 +89,6 @@ void visit(WheelTuning& c, Visitor& v) {
   v.number("climb_noise_rad_per_rthz", c.heave_noise, 0.0, 1.0);
   v.number("mag_noise_rad", c.mag_noise, 1e-4, 3.0);
   v.number("mag_interval_s", c.mag_interval, 0.0, 1000.0);
-  v.number("mag_gate", c.mag_gate, 0.001, 10.0);
   v.number("standing_speed_mps", c.standing_speed, 0.0, 2.0);
   v.number("align_time_s", c.align_time, 0.0, 60.0);
   v.number("slip_gate", c.slip_gate, 1.0, 1000.0);

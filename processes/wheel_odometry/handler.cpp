@@ -159,6 +159,8 @@ class WheelOdometryStage final : public Stage {
   std::deque<PendingSample> pending_;
 };
 
+constexpr double kMicrotesla = 1e-6;  ///< T
+
 /// Random walk that a Gauss-Markov process is over times short against its correlation.
 void take_walk(const std::optional<double>& sigma, const std::optional<double>& correlation_s, double& walk) {
   if (sigma && correlation_s) walk = *sigma * std::sqrt(2.0 / *correlation_s);
@@ -186,7 +188,7 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
   s.p_imu_axle = axle.p;
   s.p_imu_axle_std = axle.std;
   if (const auto& mag = calibration.sensors.mag) {
-    take_known(mag->hard_iron, s.hard_iron_ut);
+    if (mag->hard_iron) s.hard_iron = kMicrotesla * *mag->hard_iron;
     take_known(mag->soft_iron, s.soft_iron);
   }
   const Eigen::Vector3d forward = calibration.forward_in_body();
