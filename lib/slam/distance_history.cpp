@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "samples/samples.h"
-#include "slam/state_io.h"
 
 namespace roadfix {
 namespace {
@@ -23,6 +22,8 @@ constexpr int64_t kComparison_us = 10'000'000;
 constexpr double kNoiseSigmas = 3.0;
 
 }  // namespace
+
+double unmeasured_displacement(double dt_s) { return 0.5 * kUnmeasuredAcceleration * dt_s * dt_s; }
 
 void DistanceHistory::add(const SpeedSample& sample) {
   if (!marks_.empty() && sample.t_us <= marks_.back().sample.t_us) return;
@@ -58,7 +59,7 @@ double DistanceHistory::sigma_at(int64_t t_us) const {
   double gap_s = 1e9;
   if (after != marks_.end()) gap_s = seconds_between(t_us, after->sample.t_us);
   if (after != marks_.begin()) gap_s = std::min(gap_s, seconds_between(std::prev(after)->sample.t_us, t_us));
-  return 0.5 * kUnmeasuredAcceleration * gap_s * gap_s;
+  return unmeasured_displacement(gap_s);
 }
 
 /// Distance error due to a possible reversal, m, (S.7.4).
@@ -121,9 +122,5 @@ std::optional<TravelledDistance> rescaled_distance(const DistanceHistory& late, 
   travel->scale_std = scale_std;
   return travel;
 }
-
-void DistanceHistory::save(StateWriter& writer) const { SavingArchive{writer}(marks_); }
-
-void DistanceHistory::load(StateReader& reader) { LoadingArchive{reader}(marks_); }
 
 }  // namespace roadfix

@@ -5,8 +5,6 @@
 #include <deque>
 #include <optional>
 
-#include "stream/state_bytes.h"
-
 namespace roadfix {
 
 enum class SpeedSource : int8_t { kWheels = 0, kIns = 1 };
@@ -24,6 +22,9 @@ struct SpeedSample {
     archive(self.t_us, self.source, self.speed, self.sigma, self.scale_std, self.directed);
   }
 };
+
+/// Displacement by unmeasured acceleration within `dt_s`, m.
+[[nodiscard]] double unmeasured_displacement(double dt_s);
 
 constexpr double kMinDistanceSigma = 0.005;  ///< m; lower bound of any speed sensor's error between two images
 
@@ -49,8 +50,10 @@ class DistanceHistory {
   };
   [[nodiscard]] std::optional<Span> span() const;
 
-  void save(StateWriter& writer) const;
-  void load(StateReader& reader);
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.marks_);
+  }
 
   static constexpr int64_t kExtrapolation_us = 1'000'000;
   static constexpr int64_t kKept_us = 120'000'000;  ///< length of the history

@@ -1,39 +1,21 @@
 #include "slam/keyframe_tracker.h"
 
-#include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <opencv2/core.hpp>
 #include <utility>
 
-#include "geometry/so3.h"
 #include "slam/pose_covariance.h"
-#include "slam/reprojection.h"
+#include "slam/state_io.h"
 
 namespace roadfix {
 namespace {
 
-constexpr double kUnknownSpeedStd = 30.0;  ///< m/s, with a pose but no motion yet
-
-constexpr double kBraking = 4.0;          ///< m/s2, firm braking
-constexpr double kMaxRotationJump = 0.2;  ///< rad, instantaneous deviation from the predicted motion
-constexpr double kMaxRotationRate = 3.0;  ///< rad/s, limit of the change of rotation
-constexpr double kVisualSpeedStd = 0.2;   ///< m/s, of a speed from two images
-
-/// The motion `T` scaled in time by `factor`.
-SE3 scaled_motion(const SE3& T, double factor) { return {exp_q(factor * log_q(T.q)), factor * T.p}; }
-
-LoopCloserConfig loop_config(const KeyframeTrackerConfig& config, const CameraRig& rig) {
-  // Corners at integer pixels, from another viewpoint.
-  constexpr double kSigma_px = 1.0, kGate_px = 4.0;
-  LoopCloserConfig loops;
-  loops.pose.focal_px = Camera(rig.left).focal();
-  loops.pose.sigma_px = kSigma_px;
-  loops.pose.gate_px = kGate_px;
-  loops.with_scale = !rig.right;
-  loops.max_places = config.max_places;
-  return loops;
+std::unique_ptr<RightImageMatcher> right_matcher_of(const KeyframeTrackerConfig& config, const CameraRig& rig,
+                                                    std::unique_ptr<RightImageMatcher> given) {
+  if (!rig.right || given) return rig.right ? std::move(given) : nullptr;
+  return std::make_unique<StereoMatcher>(Camera(rig.left), Camera(*rig.right), rig.T_right_left, config.stereo);
 }
+
+Eigen::Quaterniond camera_vehicle(const CameraRig& rig) { return rig.T_vehicle_left.q.conjugate(); }
 
 }  // namespace
 
@@ -42,227 +24,372 @@ KeyframeTracker::KeyframeTracker(const KeyframeTrackerConfig& config, const Came
                                  std::unique_ptr<RightImageMatcher> right_matcher)
     : config_(config),
       rig_(rig),
-      left_(rig.left),
-      front_end_(std::move(front_end)),
-      executor_(executor),
-      map_(rig, config_),
-      T_map_camera_(rig.T_vehicle_left),
-      loops_(loop_config(config_, rig)) {
-  front_end_->set_camera(left_, rig.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitX());
-  if (!rig.right) return;
-  stereo_ = std::move(right_matcher);
-  if (!stereo_) {
-    stereo_ = std::make_unique<StereoMatcher>(left_, Camera(*rig.right), rig.T_right_left, config.stereo);
-  }
-}
-
-KeyframeTracker::~KeyframeTracker() { executor_.wait(); }
+      tracks_(std::move(front_end), Camera(rig.left), camera_vehicle(rig) * Eigen::Vector3d::UnitX()),
+      poses_(config, Camera(rig.left), camera_vehicle(rig)),
+      criterion_(config, Camera(rig.left)),
+      mapping_(config, rig, right_matcher_of(config, rig, std::move(right_matcher)), executor),
+      loops_(config, rig),
+      initialiser_(config, Camera(rig.left), camera_vehicle(rig)),
+      prior_{DistancePrior(config.scale, rig.T_vehicle_left), {}, GravityPrior(config.level_std_deg * M_PI / 180.0)},
+      vehicle_(rig.T_vehicle_left),
+      camera_{rig.T_vehicle_left, {}, {}, {}} {}
 
 const TrackedFrame& KeyframeTracker::process(const CameraFrame& frame) {
-  if (t_us_ && frame.t_us <= *t_us_) return out_;
-  finish_bundle();
-  add_speeds();
-  TrackedFrame fresh;
-  fresh.reset_counter = out_.reset_counter;
-  fresh.reset_delta = out_.reset_delta;
-  fresh.closed_reset_counter = out_.closed_reset_counter;
-  fresh.closed_reset_delta = out_.closed_reset_delta;
-  fresh.odometry.t_us = frame.t_us;
-  out_ = std::move(fresh);
-  apply_levelling();
-  if (restarted_) apply_restart(frame.t_us);
-  if (const std::string reason = rejection_reason(frame); !reason.empty()) {
-    coast_or_lose(frame.t_us, reason);
-  } else if (map_.empty()) {
-    start(frame);
+  if (camera_.t_us && frame.t_us <= *camera_.t_us) return out_;
+  begin_frame(frame.t_us);
+  const ImageCheck check = check_images(frame, rig_, config_.min_contrast);
+  out_.brightness = check.brightness;
+  if (!check.rejection.empty()) {
+    coast_or_lose(frame.t_us, check.rejection);
+  } else if (map().empty()) {
+    initialise(frame);
   } else {
-    initialise_scale();
-    track_frame(frame);
-    if (map_.empty()) restart_after_loss(std::string(out_.reason), frame);
+    const TrackedImage image = track(frame);
+    if (image.is_keyframe) close_loop(frame, add_keyframe(frame, image));
+    if (map().empty()) initialise_again(frame);
   }
-  t_us_ = frame.t_us;
-  out_.scale = stereo_ ? ScaleSource::kStereo : scale_;
-  out_.scale_std = scale_sigmas().length;
-  out_.num_keyframes = map_.num_keyframes_ever();
-  out_.num_landmarks = static_cast<int64_t>(map_.landmarks().size());
-  out_.num_loops = loops_.num_loops();
+  end_frame(frame.t_us);
   return out_;
 }
 
-std::string KeyframeTracker::rejection_reason(const CameraFrame& frame) {
-  const auto fits = [](const cv::Mat& image, const CameraIntrinsics& lens) {
-    return image.type() == CV_8UC1 && image.cols == lens.width && image.rows == lens.height;
-  };
-  if (frame.left.empty()) return "the picture cannot be read";
-  if (!fits(frame.left, rig_.left)) return "the picture does not have the size of the calibration";
-  if (rig_.right && !frame.right.empty() && !fits(frame.right, *rig_.right)) return "the right picture does not fit";
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(frame.left, mean, deviation);
-  out_.brightness = mean[0];
-  if (deviation[0] < config_.min_contrast) return mean[0] < 128.0 ? "the picture is dark" : "the picture is blank";
-  return {};
+/// What has arrived since the last frame: the adjusted map, speeds, attitudes, a restart.
+void KeyframeTracker::begin_frame(int64_t t_us) {
+  finish_adjustment();
+  prior_.distance.begin_frame();
+  out_ = out_.next(t_us);
+  level_map();
+  if (restart_) apply_restart(t_us);
 }
 
-SE3 KeyframeTracker::predict(int64_t t_us) const {
-  if (!motion_ || !t_us_ || motion_->dt_s <= 0.0) return T_map_camera_;
-  return T_map_camera_ * scaled_motion(motion_->T_before_now, seconds_between(*t_us_, t_us) / motion_->dt_s);
+void KeyframeTracker::end_frame(int64_t t_us) {
+  camera_.t_us = t_us;
+  out_.scale = mapping_.scale_source();
+  out_.scale_std = mapping_.scale_sigmas().length;
+  out_.num_keyframes = map().num_keyframes_ever();
+  out_.num_landmarks = static_cast<int64_t>(map().landmarks().size());
+  out_.num_loops = loops_.num_loops();
 }
 
-void KeyframeTracker::track_frame(const CameraFrame& frame) {
-  const SE3 T_predicted = predict(frame.t_us);
-  const std::vector<Feature> features = front_end_->track(frame.left, predicted_features(T_predicted));
-  pixels_.clear();
-  for (const Feature& f : features) pixels_[f.track] = f.pixel;
-  out_.num_expected = front_end_->num_expected();
+KeyframeTracker::TrackedImage KeyframeTracker::track(const CameraFrame& frame) {
+  measure_scale();
+  const SE3 T_predicted = camera_.predict(prior_.velocity, frame.t_us);
+  TrackedImage image;
+  image.features = tracks_.track(frame.left, map(), camera_.T_map_camera, T_predicted);
+  const std::vector<Feature>& features = image.features;
+  const ObservedLandmarks seen = poses_.observe(map(), features);
+  const double max_turn_error = VelocityPrior::max_turn_error(camera_.unseen_s(frame.t_us));
+  auto pose = poses_.from_landmarks(map(), seen, features.size(), T_predicted, max_turn_error);
+  if (!pose) pose = poses_.at_standstill(map(), features);
+  if (!pose && mapping_.mono_with_scale() && static_cast<int>(seen.points.size()) < config_.min_inliers) {
+    pose = poses_.at_pull_away(map(), features, frame.t_us, T_predicted, prior_.distance);
+  }
+  out_.num_expected = tracks_.num_expected();
   out_.num_matches = static_cast<int>(features.size());
-  if (!solve(features, T_predicted)) {
-    if (!hold_at_standstill(frame, features) && !track_bearing_only(frame, features))
-      coast_or_lose(frame.t_us, "too few landmarks agree on a pose");
-    return;
-  }
-  drop_outlier_tracks(features);
-  update_redetection_rate();
-  if (needs_keyframe(features)) make_keyframe(frame, features);
-}
-
-/// A few wrong landmarks can agree on an impossible rotation; the prediction error is limited.
-bool KeyframeTracker::rotation_plausible(const Eigen::Quaterniond& q_expected,
-                                         const Eigen::Quaterniond& q_found) const {
-  const double unseen_s = t_good_us_ ? seconds_between(*t_good_us_, out_.odometry.t_us) : 0.0;
-  return log_q(q_expected.conjugate() * q_found).norm() < kMaxRotationJump + kMaxRotationRate * unseen_s;
-}
-
-bool KeyframeTracker::solve(const std::vector<Feature>& features, const SE3& T_predicted) {
-  std::vector<PosePoint> points;
-  std::vector<size_t> index;
+  out_.num_landmarks_seen = static_cast<int>(seen.points.size());
   for (size_t i = 0; i < features.size(); ++i) {
-    out_.features.push_back({features[i], FeatureStatus::kMatched});
-    const Landmark* landmark = map_.find(features[i].track);
-    const auto normalised = left_.unproject(features[i].pixel.cast<double>());
-    if (landmark == nullptr || !landmark->p_map || !normalised) continue;
-    points.push_back({*landmark->p_map, *normalised});
-    index.push_back(i);
+    out_.features.push_back({features[i], pose ? pose->status[i] : FeatureStatus::kMatched});
   }
-  out_.num_landmarks_seen = static_cast<int>(points.size());
-  const PoseSolverConfig config{left_.focal(), config_.sigma_px, config_.gate_px, config_.min_inliers, map_.lens()};
-  auto solution = solve_pose(points, T_predicted, config);
-  if (!solution || 2 * solution->num_inliers < static_cast<int>(points.size())) {
-    auto found = search_pose(points, config);
-    if (found && (!solution || found->num_inliers > solution->num_inliers)) solution = std::move(found);
+  if (!pose) {
+    coast_or_lose(frame.t_us, "too few landmarks agree on a pose");
+    return {};
   }
-  if (!solution || !rotation_plausible(T_predicted.q, solution->T_map_camera.q)) return false;
-  for (size_t k = 0; k < index.size(); ++k) {
-    out_.features[index[k]].status = solution->inlier[k] ? FeatureStatus::kInlier : FeatureStatus::kOutlier;
+  accept_pose(frame.t_us, *pose);
+  if (pose->from_landmarks || pose->needs_keyframe) drop_outliers();
+  if (pose->from_landmarks) {
+    criterion_.add_image(pose->num_inliers);
+    image.is_keyframe = criterion_.met(map(), camera_.T_map_camera, features, pose->num_inliers);
+  } else {
+    image.is_keyframe = pose->needs_keyframe;
+    image.standstill = pose->standstill;
   }
-  out_.num_inliers = solution->num_inliers;
-  out_.rms_px = solution->rms_px;
-  const bool weak = solution->num_inliers < config_.weak_inliers ||
-                    solution->num_inliers < config_.weak_ratio * static_cast<double>(points.size());
-  out_.state = weak ? TrackState::kWeak : TrackState::kGood;
-  if (weak) out_.reason = "few landmarks agree with the pose";
-  accept_pose(out_.odometry.t_us, solution->T_map_camera, solution->cov);
-  return true;
+  return image;
 }
 
-void KeyframeTracker::accept_pose(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera) {
-  if (t_us_) motion_ = FrameMotion{T_map_camera_.inverse() * T_map_camera, seconds_between(*t_us_, t_us)};
-  set_pose(t_us, T_map_camera, cov_camera, 2.0 * cov_camera);
+void KeyframeTracker::drop_outliers() {
+  const std::vector<int64_t> outliers = outlier_tracks(out_);
+  tracks_.drop(outliers);
+  mapping_.forget(outliers);
 }
 
-/// Sets the pose with motion_ already known; cov_motion: of motion_.T_before_now, position in the map.
-void KeyframeTracker::set_pose(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_camera,
+void KeyframeTracker::accept_pose(int64_t t_us, const TrackedPose& pose) {
+  out_.state = pose.state;
+  out_.reason = pose.reason;
+  out_.num_inliers = pose.num_inliers;
+  out_.rms_px = pose.rms_px;
+  if (camera_.t_us) {
+    prior_.velocity.set(
+        FrameMotion{camera_.T_map_camera.inverse() * pose.T_map_camera, seconds_between(*camera_.t_us, t_us)});
+  }
+  set_pose(t_us, pose.T_map_camera, pose.cov, 2.0 * pose.cov);
+}
+
+/// Sets the pose with the last motion already known; cov_motion: of that motion, position in the map.
+void KeyframeTracker::set_pose(int64_t t_us, const SE3& T_map_camera, const Matrix6d& cov_image,
                                const Matrix6d& cov_motion) {
-  T_map_camera_ = T_map_camera;
-  t_good_us_ = t_us;
+  camera_.T_map_camera = T_map_camera;
+  camera_.pose_us = t_us;
   record_attitude(t_us);
-  set_output_pose(T_map_camera, cov_camera);
-  Odometry& o = out_.odometry;
-  o.validity = Validity::kValid;
-  o.cov_velocity = kUnknownSpeedStd * kUnknownSpeedStd * Eigen::Matrix3d::Identity();
-  if (motion_ && motion_->dt_s > 0.0) {
-    const Matrix6d cov_vehicle = transported(cov_motion, T_map_camera, rig_.T_vehicle_left.inverse());
-    const Eigen::Matrix3d R = o.T_frame_vehicle.R();
-    set_output_motion(R.transpose() * cov_vehicle.topLeftCorner<3, 3>() * R / (motion_->dt_s * motion_->dt_s));
-  }
-}
-
-/// Sigmas of the common scales. Monocular: the estimated focal length, (S.8.1).
-ScaleSigmas KeyframeTracker::scale_sigmas() const {
-  if (stereo_ && !map_.right_camera_lost()) return rig_.scale_sigmas;
-  const double turns = map_.focal_std();
-  if (stereo_) return {std::max(rig_.scale_sigmas.length, scale_std_), std::max(rig_.scale_sigmas.rotation, turns)};
-  return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, turns};
-}
-
-/// Output pose and covariances: transported map covariance, `cov_camera` of this image, and the common scales.
-void KeyframeTracker::set_output_pose(const SE3& T_map_camera, const Matrix6d& cov_camera) {
-  const SE3 T_keyframe_now = map_.last().T_map_camera.inverse() * T_map_camera;
-  const SE3 T_camera_vehicle = rig_.T_vehicle_left.inverse();
-  const ScaleSigmas sigmas = scale_sigmas();
-  const bool metres = stereo_ || scale_ != ScaleSource::kNone;
-  const Eigen::Vector3d lever = metres ? Eigen::Vector3d::Zero() : T_camera_vehicle.p;
-  considered_.propagate_to(T_map_camera, sigmas, lever);
-  const Matrix6d cov = transported(cov_keyframe_, map_.last().T_map_camera, T_keyframe_now) + cov_camera;
-  out_.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle;
-  out_.odometry.cov_pose = transported(cov + considered_.cov(), T_map_camera, T_camera_vehicle);
-  out_.scale_sensitivity = pose_transport_jacobian(T_map_camera, T_camera_vehicle) * considered_.columns();
-  out_.cov_image = transported(cov_camera, T_map_camera, T_camera_vehicle);
-  out_.cov_map = transported(cov_window_, map_.last().T_map_camera, T_keyframe_now * T_camera_vehicle);
-  out_.map_time = seconds_between(map_.last_fixed_us(), out_.odometry.t_us);
-  const Sim3& S_map_odom = loops_.S_map_odom();
-  const SE3 T_closed_keyframe = S_map_odom.rigid() * map_.last().T_map_camera;
-  const SE3 T_closed_camera = (S_map_odom * Sim3{T_map_camera.q, T_map_camera.p, 1.0}).rigid();
-  considered_closed_.propagate_to(T_closed_camera, sigmas, lever);
-  const Matrix6d cov_closed =
-      transported(cov_closed_, T_closed_keyframe, T_keyframe_now) + rotated(cov_camera, S_map_odom);
-  out_.cov_closed = transported(cov_closed + considered_closed_.cov(), T_closed_camera, T_camera_vehicle);
-}
-
-/// Velocities from the last motion; covariance without the common length scale.
-void KeyframeTracker::set_output_motion(const Eigen::Matrix3d& cov_velocity) {
-  const SE3 T_before_now = rig_.T_vehicle_left * motion_->T_before_now * rig_.T_vehicle_left.inverse();
-  Odometry& o = out_.odometry;
-  o.velocity = T_before_now.q.conjugate() * T_before_now.p / motion_->dt_s;
-  o.angular_rate = log_q(T_before_now.q) / motion_->dt_s;
-  const Eigen::Vector3d shared = scale_sigmas().length * o.velocity;
-  o.cov_velocity = cov_velocity + shared * shared.transpose();
-}
-
-void KeyframeTracker::drop_outlier_tracks(const std::vector<Feature>& features) {
-  std::vector<int64_t> wrong;
-  for (size_t i = 0; i < features.size(); ++i) {
-    if (out_.features[i].status == FeatureStatus::kOutlier) wrong.push_back(features[i].track);
-  }
-  front_end_->drop(wrong);
-  map_.forget(wrong);
-  for (const int64_t track : wrong) pixels_.erase(track);
+  vehicle_.set_pose(camera_, mapping_, loops_, cov_image, out_);
+  vehicle_.set_motion(camera_, prior_.velocity, cov_motion, mapping_.scale_sigmas().length, out_.odometry);
+  out_.odometry.validity = Validity::kValid;
 }
 
 void KeyframeTracker::coast_or_lose(int64_t t_us, const std::string& reason) {
   out_.reason = reason;
-  if (map_.empty()) {
-    out_.state = state_without_map(t_us, false);
+  if (map().empty()) {
+    out_.state = initialiser_.state_without_map(t_us, false, camera_.had_pose());
     return;
   }
-  const SE3 T_predicted = predict(t_us);
-  const double without_s = seconds_between(*t_good_us_, t_us);
-  T_map_camera_ = T_predicted;
-  if (without_s < config_.lost_after_s) {
-    out_.state = TrackState::kWeak;
-    set_output_pose(T_predicted, Matrix6d::Identity() * (without_s * without_s));
-    out_.odometry.validity = Validity::kCoasting;
-    // From the last motion; a braking car departs from it.
-    const bool moving = motion_ && motion_->dt_s > 0.0;
-    const double sigma = moving ? kVisualSpeedStd + kBraking * without_s : kUnknownSpeedStd;
-    out_.odometry.cov_velocity = sigma * sigma * Eigen::Matrix3d::Identity();
-    if (moving) set_output_motion(Eigen::Matrix3d(out_.odometry.cov_velocity));
+  const double unseen_s = camera_.unseen_s(t_us);
+  camera_.T_map_camera = camera_.predict(prior_.velocity, t_us);
+  if (unseen_s >= config_.lost_after_s) {
+    out_.state = TrackState::kLost;
+    clear_map();
     return;
   }
-  out_.state = TrackState::kLost;
-  map_.clear();
-  front_end_->reset();
-  pixels_.clear();
-  start_.reset();
+  out_.state = TrackState::kWeak;
+  vehicle_.set_pose(camera_, mapping_, loops_, Matrix6d::Identity() * (unseen_s * unseen_s), out_);
+  vehicle_.set_predicted_motion(prior_.velocity, unseen_s, mapping_.scale_sigmas().length, out_.odometry);
+  out_.odometry.validity = Validity::kCoasting;
+}
+
+/// Local mapping. Returns the keyframe's features.
+std::vector<Feature> KeyframeTracker::add_keyframe(const CameraFrame& frame, const TrackedImage& image) {
+  std::vector<Feature> features = tracks_.active(image.features);
+  for (const Feature& f : tracks_.replenish()) {
+    features.push_back(f);
+    tracks_.activate(f);
+    out_.features.push_back({f, FeatureStatus::kNew});
+  }
+  if (!map().empty()) {
+    const SE3& T_map_before = map().last().T_map_camera;
+    const SE3 T_before_now = T_map_before.inverse() * camera_.T_map_camera;
+    camera_.covariance.propagate(T_map_before, T_before_now);
+    loops_.covariance().propagate(loops_.S_map_odom().rigid() * T_map_before, T_before_now);
+  }
+  const NewKeyframe added =
+      mapping_.add_keyframe(frame, camera_.T_map_camera, features, image.standstill, prior_.distance);
+  criterion_.begin_keyframe(added.num_landmarks);
+  set_right_pixels(features, added.right, out_);
+  return features;
+}
+
+void KeyframeTracker::close_loop(const CameraFrame& frame, const std::vector<Feature>& features) {
+  const SE3 T_before = loops_.closed(camera_.T_map_camera);
+  if (!loops_.add_keyframe(frame.left, features, map())) return;
+  const SE3& T_camera_vehicle = vehicle_.T_camera_vehicle();
+  ++out_.closed_reset_counter;
+  out_.closed_reset_delta =
+      pose_change(T_before * T_camera_vehicle, loops_.closed(camera_.T_map_camera) * T_camera_vehicle);
+}
+
+void KeyframeTracker::finish_adjustment() {
+  const auto adjusted = mapping_.finish_adjustment();
+  if (!adjusted) return;
+  tracks_.drop(adjusted->outliers);
+  camera_.T_map_camera = map().last().T_map_camera;  // the previous frame was the last keyframe
+  camera_.covariance.add(adjusted->cov_keyframe, adjusted->scale_drift);
+  loops_.covariance().add(rotated(adjusted->cov_keyframe, loops_.S_map_odom()), adjusted->scale_drift);
+}
+
+void KeyframeTracker::measure_scale() {
+  const auto measured = mapping_.measure_scale(prior_.distance);
+  if (!measured) return;
+  reset_scale_drift();
+  if (!measured->factor) return;
+  prior_.velocity.rescale(*measured->factor);
+  ++out_.reset_counter;  // the scale changes, the pose does not
+  out_.reset_delta = SE3{};
+}
+
+void KeyframeTracker::reset_scale_drift() {
+  camera_.covariance.reset_scale_drift();
+  loops_.covariance().reset_scale_drift();
+}
+
+void KeyframeTracker::initialise(const CameraFrame& frame) {
+  if (mapping_.stereo() && !frame.right.empty()) {
+    initialise_stereo(frame);
+  } else {
+    initialise_mono(frame);
+  }
+}
+
+/// The image that loses a map is the first of the next one.
+void KeyframeTracker::initialise_again(const CameraFrame& frame) {
+  const std::string loss = out_.reason;
+  out_.features.clear();
+  out_.num_matches = out_.num_landmarks_seen = out_.num_inliers = 0;
+  initialise(frame);
+  if (map().empty()) out_.reason = loss;
+}
+
+void KeyframeTracker::initialise_stereo(const CameraFrame& frame) {
+  relocalise(frame);
+  close_loop(frame, add_keyframe(frame, {tracks_.track(frame.left), true, {}}));
+  if (criterion_.landmarks() < config_.start_points) {
+    out_.reason = "too few points in both pictures";
+    out_.state = initialiser_.state_without_map(frame.t_us, false, camera_.had_pose());
+    finish_adjustment();
+    mapping_.clear();
+    tracks_.reset();
+    return;
+  }
+  constexpr double kGivenSpeedStd = 1.0;  // m/s, of the velocity of a restart
+  const bool given = prior_.velocity.motion() && !camera_.pose_us;
+  begin_map(frame.t_us, given ? prior_.velocity.motion() : std::nullopt,
+            kGivenSpeedStd * kGivenSpeedStd * Matrix6d::Identity());
+}
+
+void KeyframeTracker::initialise_mono(const CameraFrame& frame) {
+  const InitialisationStep step = initialiser_.track(frame, camera_, prior_, tracks_, out_);
+  if (step.standing) record_attitude(frame.t_us);
+  if (step.map) begin_two_views(*step.map);
+  if (!step.is_first) return;
+  relocalise(frame);
+  record_attitude(frame.t_us);
+}
+
+void KeyframeTracker::begin_two_views(const TwoViewMap& views) {
+  if (views.measured) reset_scale_drift();
+  criterion_.set_landmarks(mapping_.add_two_views(views, prior_.distance));
+  finish_adjustment();
+  const InitialMotion initial = mapping_.initial_motion();
+  begin_map(views.second.t_us, initial.motion, initial.cov);
+}
+
+void KeyframeTracker::begin_map(int64_t t_us, const std::optional<FrameMotion>& motion, const Matrix6d& cov_motion) {
+  const bool after_loss = camera_.had_pose();
+  const bool relocalised = loops_.begin_map(after_loss);
+  if (after_loss && !relocalised) {  // the motion in between is unknown
+    const UnseenMotion unseen = prior_.velocity.since_loss(camera_.unseen_s(t_us));
+    const Eigen::Vector3d up = rig_.T_vehicle_left.q.conjugate() * Eigen::Vector3d::UnitZ();
+    camera_.covariance.add(unseen, up);
+    loops_.covariance().add(unseen, up);
+    out_.reset_delta = SE3{};
+  }
+  if (after_loss) out_.count_reset(SE3(out_.reset_delta));
+  prior_.velocity.set(motion);
+  initialiser_.forget_usable();
+  out_.map_started = true;
+  out_.state = relocalised ? TrackState::kRelocalised : TrackState::kGood;
+  out_.reason = relocalised ? "found back at a place seen before" : "";
+  set_pose(t_us, map().last().T_map_camera, Matrix6d::Zero(), cov_motion);
+}
+
+/// After a loss: a recognised place gives the start pose of the next map.
+void KeyframeTracker::relocalise(const CameraFrame& frame) {
+  if (!camera_.pose_us) return;
+  const auto found =
+      loops_.locate(frame.left, map(), camera_.T_map_camera, prior_.velocity.speed(), camera_.unseen_s(frame.t_us));
+  if (!found) return;
+  const SE3& T_camera_vehicle = vehicle_.T_camera_vehicle();
+  loops_.set_relocalised();
+  out_.reset_delta = pose_change(camera_.T_map_camera * T_camera_vehicle, *found * T_camera_vehicle);
+  camera_.T_map_camera = *found;
+}
+
+/// About the vehicle: its position is unchanged, its past trajectory rotates.
+void KeyframeTracker::level_map() {
+  const SE3 T_old_vehicle = camera_.T_map_camera * vehicle_.T_camera_vehicle();
+  const auto levelling = prior_.gravity.take_levelling(T_old_vehicle.p);
+  if (!levelling) return;
+  mapping_.move(levelling->transform());
+  camera_.T_map_camera = levelling->transform() * camera_.T_map_camera;
+  const SE3& T_map_keyframe = map().empty() ? camera_.T_map_camera : map().last().T_map_camera;
+  camera_.covariance.level(*levelling, T_map_keyframe);
+  loops_.level(*levelling, T_map_keyframe);
+  if (!camera_.pose_us) return;  // no pose has been published yet
+  const SE3 T_new_vehicle = camera_.T_map_camera * vehicle_.T_camera_vehicle();
+  out_.count_reset({T_old_vehicle.q.conjugate() * T_new_vehicle.q, Eigen::Vector3d::Zero()});
+}
+
+void KeyframeTracker::restart(const Restart& restart) {
+  restart_ = restart;
+  prior_.gravity.set_known();  // the axes of a restart pose are kept
+}
+
+/// First frame after a restart: the given pose is extrapolated to now, or to the reference pose that is still tracked.
+void KeyframeTracker::apply_restart(int64_t t_us) {
+  const Restart given = *std::exchange(restart_, std::nullopt);
+  auto reference = restart_reference(given.t_us, t_us, mapping_, initialiser_, camera_.T_map_camera);
+  if (!reference) {
+    clear_map();
+    reference = ReferencePose{t_us, camera_.T_map_camera};
+  }
+  const RestartPose pose = extrapolated(given, reference->t_us, rig_.T_vehicle_left);
+  const SE3 T_new_old = pose.T_map_camera * reference->T_map_camera.inverse();
+  const SE3 T_old_vehicle = camera_.T_map_camera * vehicle_.T_camera_vehicle();
+  camera_.T_map_camera = T_new_old * camera_.T_map_camera;
+  Matrix6d cov = pose.cov;
+  if (map().empty()) {
+    prior_.velocity.set_velocity(vehicle_.T_camera_vehicle().q * given.velocity);
+    camera_.pose_us.reset();
+    initialiser_.forget_usable();
+  } else {
+    mapping_.move(T_new_old);
+    loops_.move_map(T_new_old);
+    cov = transported(cov, pose.T_map_camera, pose.T_map_camera.inverse() * map().last().T_map_camera) +
+          mapping_.cov_own();
+  }
+  camera_.covariance.start_at(pose.T_map_camera, cov);
+  loops_.restart(camera_.covariance, !map().empty());
+  out_.count_reset(pose_change(T_old_vehicle, camera_.T_map_camera * vehicle_.T_camera_vehicle()));
+}
+
+void KeyframeTracker::record_attitude(int64_t t_us) {
+  prior_.gravity.record(t_us, (camera_.T_map_camera * vehicle_.T_camera_vehicle()).q);
+}
+
+void KeyframeTracker::clear_map() {
+  mapping_.clear();
+  tracks_.reset();
+  initialiser_.reset();
+}
+
+ScaleSensitivity KeyframeTracker::scale_sensitivity_at(int64_t t_us) const {
+  return vehicle_.sensitivity_at(t_us, out_, camera_, prior_.velocity, mapping_.scale_sigmas());
+}
+
+Odometry KeyframeTracker::at(int64_t t_us) const {
+  const bool outdated = camera_.t_us && seconds_between(*camera_.t_us, t_us) > config_.lost_after_s;
+  if (!outdated) return vehicle_.at(t_us, out_, camera_, prior_.velocity, mapping_.scale_sigmas());
+  Odometry odometry = out_.odometry;
+  odometry.t_us = t_us;
+  odometry.validity = Validity::kInvalid;
+  return odometry;
+}
+
+Odometry KeyframeTracker::closed(Odometry odometry) const { return loops_.closed(odometry, out_.cov_closed); }
+
+void KeyframeTracker::digest(Digest& digest) const {
+  digest.add(camera_.T_map_camera.q.coeffs());
+  digest.add(camera_.T_map_camera.p);
+  digest.add(camera_.covariance.keyframe());
+  digest.add(camera_.covariance.scales().columns());
+  digest.add(loops_.S_map_odom().p);
+  digest.add(loops_.S_map_odom().q.coeffs());
+  digest.add(lens().value);
+  digest.add(map().num_keyframes_ever());
+}
+
+template <class Tracker, class Archive>
+void KeyframeTracker::members(Tracker& self, Archive& archive) {
+  archive(self.out_, self.tracks_, self.criterion_, self.loops_, self.initialiser_, self.prior_, self.camera_,
+          self.restart_);
+}
+
+void KeyframeTracker::save(StateWriter& writer) const {
+  SavingArchive archive(writer);
+  members(*this, archive);
+  mapping_.save(writer);
+}
+
+void KeyframeTracker::load(StateReader& reader) {
+  out_ = {};
+  LoadingArchive archive(reader);
+  members(*this, archive);
+  mapping_.load(reader, prior_.distance);
 }
 
 }  // namespace roadfix

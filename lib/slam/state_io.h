@@ -21,7 +21,7 @@ inline void get_pose(SE3& T, StateReader& reader) {
   reader.get(T.p);
 }
 
-/// A struct that lists its members: `static void members(auto& self, auto& archive) { archive(self.a, self.b); }`.
+/// A class that lists its members: `static void members(auto& self, auto& archive) { archive(self.a, self.b); }`.
 template <class T, class Archive>
 concept NamesMembers = requires(T& value, Archive& archive) {
   T::members(value, archive);
@@ -41,6 +41,8 @@ class SavingArchive {
   void put(const T& value) {
     if constexpr (NamesMembers<T, SavingArchive>) {
       T::members(value, *this);
+    } else if constexpr (requires { value.save(writer_); }) {
+      value.save(writer_);
     } else {
       writer_.put(value);
     }
@@ -90,6 +92,8 @@ class LoadingArchive {
   void get(T& value) {
     if constexpr (NamesMembers<T, LoadingArchive>) {
       T::members(value, *this);
+    } else if constexpr (requires { value.load(reader_); }) {
+      value.load(reader_);
     } else {
       reader_.get(value);
     }

@@ -3,7 +3,7 @@
 #include <random>
 
 #include "geometry/so3.h"
-#include "slam/loop_closer.h"
+#include "slam/place_graph.h"
 #include "support/numerical_jacobian.h"
 
 namespace roadfix {
@@ -108,10 +108,10 @@ struct Laps {
 
 /// Two laps with an odometry with yaw drift and, in mono, scale drift.
 Laps two_laps(bool with_scale, int save_at = -1) {
-  LoopCloserConfig config;
+  PlaceGraphConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
   config.with_scale = with_scale;
-  auto closer = std::make_unique<LoopCloser>(config);
+  auto places = std::make_unique<PlaceGraph>(config);
   const World world(1);
   SE3 T_odom = on_circle(0.0);
   double scale = 1.0;
@@ -124,22 +124,22 @@ Laps two_laps(bool with_scale, int save_at = -1) {
       step.q = step.q * exp_q({0.0, 0.0007, 0.0002});
       T_odom = T_odom * step;
     }
-    (void)closer->add_place(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
+    (void)places->add_place(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
     if (i != save_at) continue;
     StateWriter writer;
-    closer->save(writer);
+    places->save(writer);
     const auto state = writer.take();
-    closer = std::make_unique<LoopCloser>(config);
+    places = std::make_unique<PlaceGraph>(config);
     StateReader reader(state);
-    closer->load(reader);
+    places->load(reader);
     reader.finish();
   }
-  laps.loops = closer->num_loops();
+  laps.loops = places->num_loops();
   laps.odom_error = (T_odom.p - on_circle(2 * kLap).p).norm();
-  const Sim3 end = closer->S_map_odom() * Sim3{T_odom.q, T_odom.p, 1.0};
+  const Sim3 end = places->S_map_odom() * Sim3{T_odom.q, T_odom.p, 1.0};
   laps.map_error = (end.p - on_circle(2 * kLap).p).norm();
   StateWriter writer;
-  closer->save(writer);
+  places->save(writer);
   laps.state = writer.take();
   return laps;
 }
@@ -154,14 +154,14 @@ TEST_CASE("a second lap is recognised and the loop closed, with and without scal
 }
 
 TEST_CASE("another street is not recognised as the first") {
-  LoopCloserConfig config;
+  PlaceGraphConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
   const World known(1), other(2);
   const auto loops = [&](const World& later) {
-    LoopCloser closer(config);
-    for (int i = 0; i < 30; ++i) (void)closer.add_place(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
-    for (int i = 0; i < 30; ++i) (void)closer.add_place(later.view(on_circle(i), on_circle(i), 1.0, 6), false);
-    return closer.num_loops();
+    PlaceGraph places(config);
+    for (int i = 0; i < 30; ++i) (void)places.add_place(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
+    for (int i = 0; i < 30; ++i) (void)places.add_place(later.view(on_circle(i), on_circle(i), 1.0, 6), false);
+    return places.num_loops();
   };
   CHECK(loops(other) == 0);
   CHECK(loops(known) > 15);  // teeth
@@ -174,13 +174,13 @@ TEST_CASE("the same laps give the same bytes, also through a saved state") {
 }
 
 TEST_CASE("the number of places is bounded") {
-  LoopCloserConfig config;
+  PlaceGraphConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
   config.max_places = 30;
-  LoopCloser closer(config);
+  PlaceGraph places(config);
   const World world(1);
-  for (int i = 0; i < 2 * kLap; ++i) (void)closer.add_place(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
-  CHECK(closer.num_places() == 30);
+  for (int i = 0; i < 2 * kLap; ++i) (void)places.add_place(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
+  CHECK(places.num_places() == 30);
 }
 
 }  // namespace

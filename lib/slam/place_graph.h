@@ -18,7 +18,6 @@ namespace roadfix {
 
 /// Observation of one place.
 struct PlaceView {
-  int64_t t_us = 0;
   SE3 T_odom_camera;
   std::vector<Eigen::Vector2d> normalised;               ///< corners
   cv::Mat descriptors;                                   ///< one row each
@@ -26,15 +25,15 @@ struct PlaceView {
   Matrix6d cov = Matrix6d::Zero();                       ///< of the camera's pose in map
 };
 
-struct LoopCloserConfig {
+struct PlaceGraphConfig {
   PoseSolverConfig pose;
   bool with_scale = false;  ///< monocular: optimise the scale too
   int max_places = 1000;    ///< stored; older ones are removed
 };
 
-class LoopCloser {
+class PlaceGraph {
  public:
-  explicit LoopCloser(const LoopCloserConfig& config) : config_(config) {}
+  explicit PlaceGraph(const PlaceGraphConfig& config) : config_(config) {}
 
   /// Stores this place; true where a loop was closed. `continuous`: the odometry did not jump since the previous place.
   bool add_place(const PlaceView& view, bool continuous);
@@ -77,7 +76,7 @@ class LoopCloser {
   void store_place(const PlaceView& view);
   void forget_oldest();
 
-  LoopCloserConfig config_;
+  PlaceGraphConfig config_;
   PlaceIndex index_;
   std::deque<Place> places_;
   std::deque<PoseConstraint> odometry_constraints_;  ///< from each place to the next; a and b are ids here

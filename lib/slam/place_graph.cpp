@@ -1,4 +1,4 @@
-#include "slam/loop_closer.h"
+#include "slam/place_graph.h"
 
 #include <algorithm>
 #include <cmath>
@@ -70,7 +70,7 @@ std::vector<Pair> match(const cv::Mat& view, const cv::Mat& place) {
 
 }  // namespace
 
-std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view, size_t index, bool with_scale) const {
+std::optional<PlaceGraph::Recognition> PlaceGraph::verify(const PlaceView& view, size_t index, bool with_scale) const {
   const Place& place = places_[index];
   const std::vector<Pair> pairs = match(view.descriptors, place.descriptors);
   if (static_cast<int>(pairs.size()) < kMinMatches) return std::nullopt;
@@ -100,7 +100,7 @@ std::optional<LoopCloser::Recognition> LoopCloser::verify(const PlaceView& view,
   return found;
 }
 
-std::optional<LoopCloser::Recognition> LoopCloser::recognise(const PlaceView& view, int64_t newest,
+std::optional<PlaceGraph::Recognition> PlaceGraph::recognise(const PlaceView& view, int64_t newest,
                                                              bool with_scale) const {
   if (places_.empty() || view.descriptors.empty()) return std::nullopt;
   std::optional<Recognition> best;
@@ -111,14 +111,14 @@ std::optional<LoopCloser::Recognition> LoopCloser::recognise(const PlaceView& vi
   return best;
 }
 
-std::optional<SE3> LoopCloser::locate(const PlaceView& view) const {
+std::optional<SE3> PlaceGraph::locate(const PlaceView& view) const {
   const auto found = recognise(view, next_id_ - 1, false);  // after a loss there is no scale to compare
   if (!found) return std::nullopt;
   const Sim3 S_place_camera{found->solution.T_map_camera.q, found->solution.T_map_camera.p, 1.0};
   return (S_map_odom_.inverse() * places_[found->place].S_map_camera * S_place_camera).rigid();
 }
 
-void LoopCloser::store_place(const PlaceView& view) {
+void PlaceGraph::store_place(const PlaceView& view) {
   Place place;
   place.id = next_id_++;
   place.cov = view.cov;
@@ -133,7 +133,7 @@ void LoopCloser::store_place(const PlaceView& view) {
   if (static_cast<int>(places_.size()) > config_.max_places) forget_oldest();
 }
 
-void LoopCloser::forget_oldest() {
+void PlaceGraph::forget_oldest() {
   places_.pop_front();
   odometry_constraints_.pop_front();
   const int64_t first = places_.front().id;
@@ -142,7 +142,7 @@ void LoopCloser::forget_oldest() {
   index_.forget_before(first);
 }
 
-void LoopCloser::rotate(const LevellingRotation& turn) {
+void PlaceGraph::rotate(const LevellingRotation& turn) {
   const SE3 T = turn.transform();
   const Sim3 S{T.q, T.p, 1.0};
   for (Place& place : places_) {
@@ -153,7 +153,7 @@ void LoopCloser::rotate(const LevellingRotation& turn) {
   S_map_odom_ = S * S_map_odom_ * S.inverse();
 }
 
-void LoopCloser::move(int64_t first, const SE3& T_odom_odom) {
+void PlaceGraph::move(int64_t first, const SE3& T_odom_odom) {
   const Sim3 S = S_map_odom_ * Sim3{T_odom_odom.q, T_odom_odom.p, 1.0} * S_map_odom_.inverse();
   for (Place& place : places_) {
     if (place.id >= first) place.S_map_camera = S * place.S_map_camera;
@@ -161,7 +161,7 @@ void LoopCloser::move(int64_t first, const SE3& T_odom_odom) {
   if (!places_.empty() && places_.back().id >= first) T_odom_last_ = T_odom_odom * T_odom_last_;
 }
 
-bool LoopCloser::add_place(const PlaceView& view, bool continuous) {
+bool PlaceGraph::add_place(const PlaceView& view, bool continuous) {
   const auto found = recognise(view, next_id_ - kMinPlaceGap, config_.with_scale);
   const int64_t id = next_id_;
   if (!places_.empty()) {
@@ -246,7 +246,7 @@ PoseConstraint get_tie(StateReader& reader) {
 
 }  // namespace
 
-void LoopCloser::save(StateWriter& writer) const {
+void PlaceGraph::save(StateWriter& writer) const {
   writer.put(next_id_);
   writer.put(num_loops_);
   put_pose(T_odom_last_, writer);
@@ -266,8 +266,8 @@ void LoopCloser::save(StateWriter& writer) const {
   for (const PoseConstraint& constraint : loops_) put_tie(constraint, writer);
 }
 
-void LoopCloser::load(StateReader& reader) {
-  *this = LoopCloser(config_);
+void PlaceGraph::load(StateReader& reader) {
+  *this = PlaceGraph(config_);
   reader.get(next_id_);
   reader.get(num_loops_);
   get_pose(T_odom_last_, reader);
