@@ -26,13 +26,12 @@ void Levelling::reset() {
 }
 
 void Levelling::add(WheelState& state, const LevellingPoint& now, const LevellingMotion& motion) {
-  if (motion.slipping) reset();
-  if (begin_.t_us) {
+  if (begin_.t_us && !motion.slipping) {
     const double dt = seconds_between(*begin_.t_us, *now.t_us);
     if (dt < std::sqrt(2.0) * motion.speed_sigma / (0.2 * config_.tuning.tilt_gate)) return;  // five sigma in the gate
     correct(state, now.gyro, (now.speed - begin_.speed) / dt, motion);
-    reset();
   }
+  reset();
   begin_ = now;
 }
 
