@@ -1,6 +1,7 @@
 #include "wheel/direction.h"
 
 #include "samples/samples.h"
+#include "vehicle/axle_speed.h"
 
 namespace roadfix {
 
@@ -9,7 +10,8 @@ void update_direction(DirectionState& d, const DirectionLimits& limits, int64_t 
   // (W.8.1): log N(m - v) - log N(m + v) = 2 m v / S
   const double evidence = 2.0 * magnitude * predicted / variance;
   if (d.sign != 0) {
-    if (magnitude < kMaxReversalSpeed && d.sign * evidence < -limits.evidence) d = {evidence > 0.0 ? 1 : -1, false, {}};
+    if (magnitude < vehicle::kSignKnown && d.sign * evidence < -limits.evidence)
+      d = {evidence > 0.0 ? 1 : -1, false, {}};
     return;
   }
   if (evidence > limits.evidence) {

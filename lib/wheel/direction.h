@@ -18,8 +18,7 @@ struct DirectionLimits {
 };
 
 /// Updates the sign with one speed magnitude (m/s), the predicted speed and the innovation variance. The sign of a
-/// moving vehicle may change only below kMaxReversalSpeed.
-inline constexpr double kMaxReversalSpeed = 0.5;  ///< m/s
+/// moving vehicle may change only below vehicle::kSignKnown.
 void update_direction(DirectionState& d, const DirectionLimits& limits, int64_t t_us, double magnitude,
                       double predicted, double variance);
 

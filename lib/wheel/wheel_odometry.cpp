@@ -16,9 +16,8 @@ constexpr double kLargestRate = 35.0;         ///< rad/s, full scale of automoti
 constexpr double kLargestForce = 400.0;       ///< m/s2, full scale of accelerometers
 constexpr double kUnknownAcceleration = 1.5;  ///< m/s2 per sqrt(Hz): 1.5 m/s2 for a second
 constexpr double kUnknownRate = 0.1;          ///< rad/s per sqrt(Hz): a street corner within a few seconds
-constexpr double kTurnDuration = 3.0;    ///< s, typical duration of a turn, for the error of an uncertain lever arm
-constexpr double kLostSpeedSigma = 3.0;  ///< m/s: the speed is lost
-constexpr double kLostYawSigma = 0.8;    ///< rad: the yaw is lost
+constexpr double kLostSpeedSigma = 3.0;       ///< m/s: the speed is lost
+constexpr double kLostYawSigma = 0.8;         ///< rad: the yaw is lost
 
 bool usable(const ImuSample& imu) {
   return imu.gyro.cwiseAbs().maxCoeff() < kLargestRate && imu.accel.cwiseAbs().maxCoeff() < kLargestForce &&
@@ -116,19 +115,17 @@ WheelInputStatus WheelOdometry::update(const WheelSpeed& z) {
 }
 
 void WheelOdometry::propagate_by_imu(const ImuSample& imu, const Eigen::Vector3d& gyro_before) {
-  const WheelSensors& s = config_.sensors;
   const Eigen::Vector3d omega = imu.gyro - state_.x.segment<3>(kGyroBias);
   WheelStep step;
   step.dt = seconds_between(state_.t_us, imu.t_us);
   step.gyro = yaw_rate_.rate(imu.gyro);
-  step.accel = imu.accel + lever_arm_acceleration(s.p_imu_axle, omega, (imu.gyro - gyro_before) / step.dt);
+  step.accel =
+      imu.accel + lever_arm_acceleration(config_.sensors.p_imu_axle, omega, (imu.gyro - gyro_before) / step.dt);
   step.standing = standstill_.standing();
   step.turning = standstill_.turning();
   step.form = config_.tuning.step_form;
-  WheelNoise noise = process_noise(config_);
-  noise.accel = std::hypot(noise.accel, std::sqrt(kTurnDuration) * omega.squaredNorm() * s.p_imu_axle_std.x());
   const double speed = state_.x(kSpeed);
-  propagate(state_, step, noise);
+  propagate(state_, step, process_noise(config_));
   state_.t_us = imu.t_us;
   forward_acceleration_ = step.standing ? 0.0 : (state_.x(kSpeed) - speed) / step.dt;
 }

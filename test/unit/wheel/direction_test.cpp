@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "vehicle/axle_speed.h"
+
 namespace roadfix {
 namespace {
 
@@ -40,11 +42,11 @@ TEST_CASE("without evidence forward is assumed and reported") {
 }
 
 TEST_CASE("the sign changes only at low speed") {
-  for (const double magnitude : {0.9 * kMaxReversalSpeed, 1.1 * kMaxReversalSpeed}) {
+  for (const double magnitude : {0.9 * vehicle::kSignKnown, 1.1 * vehicle::kSignKnown}) {
     DirectionState d{1, true, {}};
     update_direction(d, kLimits, 0, magnitude, -10.0, 0.1);
-    CHECK(d.sign == (magnitude < kMaxReversalSpeed ? -1 : 1));
-    CHECK(d.assumed == (magnitude >= kMaxReversalSpeed));
+    CHECK(d.sign == (magnitude < vehicle::kSignKnown ? -1 : 1));
+    CHECK(d.assumed == (magnitude >= vehicle::kSignKnown));
   }
 }
 
