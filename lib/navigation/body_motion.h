@@ -11,7 +11,7 @@ namespace roadfix::navigation {
 struct BodyMotion {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< rad/s against the Earth, imu axes, smoothed
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s2, dv/dt, level axes, smoothed
-  VelocityLag lag;                                         ///< of the filter alone, not of its output
+  VelocityLag lag;
 };
 
 }  // namespace roadfix::navigation

@@ -64,6 +64,8 @@ struct SourceList {
   bool zero_motion = true;
   bool magnetic_heading = true;
   bool camera = true;
+
+  [[nodiscard]] bool any_gnss() const { return gnss_position || gnss_velocity || gnss_heading; }
 };
 
 /// How the state moves between measurements.

@@ -23,6 +23,9 @@ struct Queued {
   bool has_yaw_rate = false, has_sides = false;  ///< wheels
   FixType fix_type = FixType::kNone;
 
+  [[nodiscard]] bool of_receiver() const {
+    return kind == Kind::kPosition || kind == Kind::kVelocity || kind == Kind::kHeading;
+  }
   /// s by which the value is older than its stamp on the imu's clock.
   [[nodiscard]] double age(const Mean& x) const {
     const double latency = kind == Kind::kPosition   ? x.position_latency

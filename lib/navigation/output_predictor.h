@@ -8,12 +8,14 @@ namespace roadfix::navigation {
 
 class OutputPredictor {
  public:
-  explicit OutputPredictor(const inertial::Earth& earth) : earth_(earth) {}
-
-  /// The state was corrected: begin again from it.
-  void begin(const Filter& filter, int64_t ring_index);
-  [[nodiscard]] bool begun() const { return begun_; }
+  /// The state was corrected: what was carried from it is out of date.
   void clear() { begun_ = false; }
+  /// What was carried goes on: it has missed no sample of the ring, and began `longest` s before the state's epoch at most.
+  [[nodiscard]] bool goes_on(const inertial::ImuRing& ring, int64_t state_us, double longest) const {
+    return begun_ && next_ >= ring.begin() && seconds_between(begun_at_us_, state_us) <= longest;
+  }
+  /// Begins again from the state, which stands before the first sample of the ring.
+  void begin(const Filter& filter, const inertial::ImuRing& ring);
 
   /// Moves over the samples of the ring from where it is; `noise(t_us, dt)`: densities over a sample.
   template <class Noise>
@@ -21,34 +23,31 @@ class OutputPredictor {
     for (; next_ < ring.end(); ++next_) {
       const ImuSample& s = ring[next_];
       const double dt = seconds_between(x_.t_us, s.t_us);
-      if (dt > 0.0) add(s, dt, noise(s.t_us, dt));
+      if (dt > 0.0) propagation_.add(x_, s, dt, noise(s.t_us, dt));
     }
   }
-  [[nodiscard]] int64_t next() const { return next_; }
-  [[nodiscard]] int64_t begun_at_us() const { return begun_at_us_; }
 
   /// For the true time of the newest sample's stamp: level frame to imu; velocity in imu axes, (N.8.1) to (N.8.3).
   [[nodiscard]] Odometry output();
 
+  /// `earth`: of the level frame.
   template <class Archive>
-  void serialise(Archive& a) {
-    earth_.serialise(a);
+  void serialise(Archive& a, const inertial::Earth& earth) {
+    bool begun = begun_;
+    a(begun);
+    if (begun && !begun_) propagation_ = Propagation(earth);
+    begun_ = begun;
+    if (!begun_) return;
+    propagation_.serialise(a);
     x_.serialise(a);
-    last_.serialise(a);
-    sums_.serialise(a);
-    a(motion_.rate, motion_.acceleration, p_ref_, P_, next_, begun_at_us_, begun_, covariance_at_us_, cov_pose_,
-      cov_velocity_);
+    a(p_ref_, P_, next_, begun_at_us_, covariance_at_us_, cov_pose_, cov_velocity_);
   }
 
  private:
-  void add(const ImuSample& imu, double dt, const inertial::ImuNoise& noise);
   void find_covariance();
 
-  inertial::Earth earth_;
+  Propagation propagation_{inertial::Earth()};
   Mean x_;
-  inertial::InertialStep last_;
-  inertial::TransitionSums sums_;
-  BodyMotion motion_;
   Eigen::Vector3d p_ref_ = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, kWithoutCamera, kWithoutCamera> P_;
   int64_t next_ = 0, begun_at_us_ = 0;

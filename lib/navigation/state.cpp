@@ -133,7 +133,7 @@ void State::drop_clones() {
   size_ = base_;
 }
 
-void State::correct(const Eigen::VectorXd& d) {
+void State::correct(const Eigen::Ref<const Eigen::VectorXd>& d) {
   if (held_) {
     expected_.head(size_) += d.head(size_);
   } else {
@@ -154,7 +154,7 @@ void State::release() {
   expected_.setZero();
 }
 
-void State::retract(const Eigen::VectorXd& d) {
+void State::retract(const Eigen::Ref<const Eigen::VectorXd>& d) {
   retract_base(x, d, p_ref, has_camera());
   for (Clone& c : clones) {
     const Eigen::Matrix3d dR = exp_so3(part(d, c.at));

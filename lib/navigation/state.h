@@ -51,6 +51,8 @@ inline constexpr int kBaseSize = 57;
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxPoints;
 
 using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
+/// An error of all states, without memory of its own to take.
+using ErrorVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxSize, 1>;
 
 /// Means of the base block.
 struct Mean {
@@ -127,6 +129,8 @@ class State {
   [[nodiscard]] Eigen::MatrixXd& P() { return P_; }
   [[nodiscard]] const Clone& clone(int64_t id) const { return *find_clone(id); }
   [[nodiscard]] const Clone* find_clone(int64_t id) const;
+  /// What a receiver brought back from an outage is not over, (N.5.2).
+  [[nodiscard]] bool gnss_returns() const { return P_(kReturnRate, kReturnRate) > 0.0; }
 
   /// Starts with these variances of the base block; poses and points are dropped, p_ref is the position.
   void reset(const Mean& mean, const BaseVector& variance);
@@ -137,9 +141,9 @@ class State {
   void drop_clones();
 
   /// Adds the error d (size()) to every mean, (N.1.2).
-  void retract(const Eigen::VectorXd& d);
+  void retract(const Eigen::Ref<const Eigen::VectorXd>& d);
   /// Adds the error d to the means or, while they are held, to expected().
-  void correct(const Eigen::VectorXd& d);
+  void correct(const Eigen::Ref<const Eigen::VectorXd>& d);
 
   /// From here on corrections are kept apart and the means stay a fixed course of linearisation (iterated smoothing of
   /// a start in motion); `base` is what the base block's error is expected to be. release() adds everything up.

@@ -57,6 +57,16 @@ struct Posterior {
 
 }  // namespace
 
+/// How large steps are (assumed): a tyre that loses pressure or a wheel set that is changed, biases as much as they differ
+/// from one turn-on to the next, a receiver that follows a reflection or is dragged off, a clock that is set by another one,
+/// an arm that was read off wrong. Without an imu there is no clock of its own.
+StepDetector::StepDetector(const VehicleFacts& v) {
+  constexpr double kScale = 0.02, kArm = 0.5, kReceiver = 5.0, kRate = 0.5, kClock = 0.05;  // 1, m, m, m/s, s
+  typical_ << kScale, Eigen::Vector3d::Constant(v.gyro_bias_std), Eigen::Vector3d::Constant(v.accel_bias_std),
+      Eigen::Vector3d::Constant(kReceiver), Eigen::Vector3d::Constant(kRate), v.has_imu ? kClock : 0.0, kClock, kClock,
+      Eigen::Vector3d::Constant(kArm);
+}
+
 void StepDetector::begin(State& state, const BodyMotion& motion) {
   if (state.carried().cols() != kColumns) state.carry(kColumns);
   for (int m = 0; m <= kMoments; ++m) begin(state, motion, m);
@@ -206,14 +216,33 @@ bool StepDetector::clock_stepped_lately(int64_t t_us) const {
   return clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
 }
 
-void StepDetector::take(const Step& step, State& state, const BodyMotion& motion) {
-  const int64_t t_us = state.x.t_us;
+void StepDetector::take_back(const Step& step, State& state, const BodyMotion& motion) {
+  const int n = state.size();
+  const auto per_unit = state.carried().middleCols(step.column, step.size.size()).topRows(n);
+  ErrorVector d = per_unit * step.size;
+  state.retract(d);
+  const auto widen = [&] {
+    for (int j = 0; j < n; ++j) state.P().col(j).head(n) += d(j) * d;
+  };
+  const Small root = step.cov.llt().matrixL();
+  for (int k = 0; k < root.cols(); ++k) {
+    d = per_unit * root.col(k);
+    widen();
+  }
+  if (const auto doubt = doubted(step, state.x.t_us)) {
+    d = doubt->size * state.carried().col(doubt->column).head(n);
+    widen();
+  }
+  note_clock(step, state.x.t_us);
+  begin(state, motion);
+}
+
+void StepDetector::note_clock(const Step& step, int64_t t_us) {
   if (step.kind == StepKind::kReceiverClock) {
     clock_step_ = (clock_stepped_lately(t_us) ? clock_step_ : 0.0) + step.size(0);
     clock_step_us_ = t_us;
   }
   if (step.kind == StepKind::kReceiver) clock_step_us_ = 0;
-  begin(state, motion);
 }
 
 }  // namespace roadfix::navigation

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "navigation/body_motion.h"
+#include "navigation/config.h"
 #include "navigation/state.h"
 
 namespace roadfix::navigation {
@@ -40,7 +41,6 @@ class StepDetector {
   static constexpr int first(int moment) {
     return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
   }
-  using Sizes = Eigen::Matrix<double, kWidth + kAntennaSize, 1>;
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
   using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
@@ -52,8 +52,7 @@ class StepDetector {
     Small cov;
   };
 
-  /// `typical`: standard deviations of steps, in the order of a moment's columns; then those of the antenna's place.
-  explicit StepDetector(const Sizes& typical) : typical_(typical) {}
+  explicit StepDetector(const VehicleFacts& facts);
 
   /// Watches from now on.
   void begin(State& state, const BodyMotion& motion);
@@ -89,15 +88,9 @@ class StepDetector {
   /// another kind explains as much. `displaced`: the receiver is known to be: its steps are the filter's to follow, and
   /// its antenna is asked for no place.
   [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced) const;
-  /// (N.5.11): a receiver that is dragged off along the way looks like its clock at first. Where `step` shows it
-  /// displaced: the column of that clock, and the sum of its steps of the last 16 s, s.
-  struct Doubt {
-    int column = 0;
-    double size = 0.0;
-  };
-  [[nodiscard]] std::optional<Doubt> doubted(const Step& step, int64_t t_us) const;
-  /// `step` has been taken back at that time; watches anew.
-  void take(const Step& step, State& state, const BodyMotion& motion);
+  /// Takes `step` back: what it has made of all errors goes out of the means, how well it is known into the covariance, whose
+  /// epoch is the state's. Watches anew.
+  void take_back(const Step& step, State& state, const BodyMotion& motion);
 
   /// Evidence has come since the last call.
   [[nodiscard]] bool take_fresh() { return std::exchange(fresh_, false); }
@@ -122,11 +115,20 @@ class StepDetector {
     double log_odds = 0.0;
   };
   void begin(State& state, const BodyMotion& motion, int moment);
+  void note_clock(const Step& step, int64_t t_us);
   [[nodiscard]] Fit best_of(int at, int size) const;
   [[nodiscard]] bool carries(int moment, int at, int size) const;
   [[nodiscard]] bool clock_stepped_lately(int64_t t_us) const;
+  /// (N.5.11): a receiver that is dragged off along the way looks like its clock at first. Where `step` shows it
+  /// displaced: the column of that clock, and the sum of its steps of the last 16 s, s.
+  struct Doubt {
+    int column = 0;
+    double size = 0.0;
+  };
+  [[nodiscard]] std::optional<Doubt> doubted(const Step& step, int64_t t_us) const;
 
-  Sizes typical_;
+  /// Standard deviations of steps, in the order of a moment's columns; then those of the antenna's place.
+  Eigen::Matrix<double, kWidth + kAntennaSize, 1> typical_;
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
   bool watches_ = false, fresh_ = false;
   int64_t next_us_ = 0;

@@ -3,8 +3,6 @@
 #include <array>
 #include <tuple>
 
-#include "navigation/motion/car_motion.h"
-
 namespace roadfix::navigation {
 
 namespace {
@@ -31,12 +29,12 @@ void Alignment::add(const GnssFix& fix) {
   fix_ = fix;
 }
 
-bool Alignment::try_start(int64_t t_us, const inertial::StandstillDetector& standstill, std::optional<Geodetic>& anchor,
+bool Alignment::try_start(int64_t t_us, const inertial::StandstillDetector& standstill, LevelFrame& frame,
                           const Eigen::Vector3d& bias_std, const Eigen::Vector3d& return_std) {
   const StartWithFixes with_fixes;
   const StartParked parked;
   const std::array<const StartStrategy*, 2> strategies = {&with_fixes, &parked};
-  const std::optional<EnuAnchor> enu = anchor ? std::optional(EnuAnchor(*anchor)) : std::nullopt;
+  const std::optional<EnuAnchor> enu = frame.anchor() ? std::optional(EnuAnchor(*frame.anchor())) : std::nullopt;
   // What an imu has left is none of a car without.
   const std::optional<Memory> nothing;
   const StartContext context{config_,
@@ -51,10 +49,10 @@ bool Alignment::try_start(int64_t t_us, const inertial::StandstillDetector& stan
     std::optional<StartState> start = strategy->attempt(context);
     if (!start) continue;
     parked_ = strategy == &parked;
-    if (parked_) anchor = memory_->place;
+    if (parked_) frame.set_anchor(memory_->place);
     start->bias_std = bias_std;
     start->return_std = return_std;
-    hypotheses_.start(earth_of(config_, anchor), *start);
+    hypotheses_.start(frame.earth(), *start);
     return true;
   }
   return false;

@@ -3,12 +3,9 @@
 #pragma once
 
 #include "navigation/initialisation/heading_hypotheses.h"
-#include "navigation/motion/car_motion.h"
-#include "navigation/serialise_optional.h"
+#include "navigation/level_frame.h"
 
 namespace roadfix::navigation {
-
-enum class Phase { kWaiting, kLevelling, kHeading, kDone };
 
 class Alignment {
  public:
@@ -21,12 +18,12 @@ class Alignment {
   [[nodiscard]] double waited(int64_t t_us) const { return seconds_between(first_us_, t_us); }
   /// A fix that passed the screen, for the start.
   void add(const GnssFix& fix);
-  /// At the end of a block; true: it has started, and everything stamped before begun_us() is used.
-  bool try_start(int64_t t_us, const inertial::StandstillDetector& standstill, std::optional<Geodetic>& anchor,
+  /// At the end of a block; true: the hypotheses have started, and everything stamped up to t_us is used. `bias_std`,
+  /// `return_std`: of the newest fix, m, level axes.
+  bool try_start(int64_t t_us, const inertial::StandstillDetector& standstill, LevelFrame& frame,
                  const Eigen::Vector3d& bias_std, const Eigen::Vector3d& return_std);
   [[nodiscard]] HeadingHypotheses& hypotheses() { return hypotheses_; }
   [[nodiscard]] const HeadingHypotheses& hypotheses() const { return hypotheses_; }
-  [[nodiscard]] bool has_fix() const { return fix_.has_value(); }
   [[nodiscard]] const std::optional<GnssFix>& fix() const { return fix_; }
   [[nodiscard]] const std::optional<Memory>& memory() const { return memory_; }
   void recall(const Memory& memory) { memory_ = memory; }
@@ -37,9 +34,10 @@ class Alignment {
   /// The remembered place did not hold; sensor errors are kept.
   void forget_place();
 
+  /// `earth`: of the level frame.
   template <class Archive>
-  void serialise(Archive& a, const std::optional<Geodetic>& anchor) {
-    hypotheses_.serialise(a, earth_of(config_, anchor));
+  void serialise(Archive& a, const inertial::Earth& earth) {
+    hypotheses_.serialise(a, earth);
     for (std::optional<GnssFix>* fix : {&fix_, &fix_before_})
       serialise_optional(
           a, *fix, [] { return GnssFix(); }, [&](GnssFix& f) { serialise_fix(a, f); });

@@ -6,6 +6,7 @@
 #include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "navigation/aiding/gates.h"
+#include "navigation/aiding/gnss_error_states.h"
 #include "navigation/aiding/gnss_position/gnss_position_model.h"
 #include "navigation/aiding/heading_rows.h"
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
@@ -135,7 +136,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   // Delays show through velocity and acceleration, whose direction is not known yet.
   filter.consider({kPositionLatency, 4});
   filter.initialise(x, sigmas);
-  if (s.return_std.x() > 0.0) filter.begin_return(s.return_std);
+  if (s.return_std.x() > 0.0) begin_gnss_return(filter, s.return_std);
   // Using what the mean came from as measurements gives every correlation: tilt with accelerometer bias, position with
   // attitude through the lever arm, velocity in level axes with the heading.
   const double open = Gates::open().nis[3];

@@ -2,13 +2,13 @@
 
 #include <cmath>
 
+#include "navigation/aiding/wheel_speed/wheel_speed_control.h"
 #include "vehicle/axle_velocity.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kWheelAge = 0.3;         // s, of a wheel speed to start with
 constexpr double kEvery = 0.1;            // s between two attempts
 constexpr double kForward = 4.0;          // m/s: faster, hardly a car is in reverse
 constexpr double kRestSpeed = 0.02;       // m/s, of wheels that stand
@@ -89,7 +89,7 @@ std::optional<StartState> LocalStart::attempt(const NavigationConfig& config, in
       context.still_flow_px = flow->still_px;
     }
   }
-  const bool heard = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < kWheelAge;
+  const bool heard = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < WheelSpeedControl::kSilent;
   const double speed = std::abs(speed_);
   if (heard && (has_sign_ || speed < kRestSpeed || speed > kForward)) context.wheel_speed = speed_;
   if (const auto rest = start_at_rest(context)) return rest;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/so3.h"
+
 namespace roadfix::navigation {
 
 namespace {
@@ -41,6 +43,20 @@ Memory remembered(const State& state) {
   memory.value = parameters(state.x);
   memory.sigma = state.P().diagonal().segment<Memory::kKept>(Memory::kFirst).cwiseSqrt();
   return memory;
+}
+
+Memory remembered(const State& state, const Geodetic& anchor, bool stands, double heading_std) {
+  constexpr double kParkedSigma = 10.0;  // m; a place known worse is not worth keeping
+  const EnuAnchor enu(anchor);
+  const Mean& x = state.x;
+  const Eigen::MatrixXd& P = state.P();
+  Memory m = remembered(state);
+  m.place = enu.geodetic(x.nav.position);
+  m.q_enu_imu = normalized_positive(Eigen::Quaterniond(enu.R_anchor_enu_at(m.place).transpose()) * x.nav.q_level_imu);
+  m.place_sigma = std::sqrt(P(kPos, kPos) + P(kPos + 1, kPos + 1));
+  m.heading_sigma = std::sqrt(P(kAtt + 2, kAtt + 2));
+  m.parked = stands && m.heading_sigma < heading_std && m.place_sigma < kParkedSigma;
+  return m;
 }
 
 }  // namespace roadfix::navigation

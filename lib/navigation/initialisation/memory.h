@@ -35,5 +35,8 @@ struct Memory {
 void recall(const Memory& memory, Mean& x, BaseVector& std);
 /// The part of a state that is kept.
 Memory remembered(const State& state);
+/// The same of a state in the enu frame of `anchor`, with place and heading; `stands`: the car does, and is parked where
+/// these are known, the heading to `heading_std` rad.
+Memory remembered(const State& state, const Geodetic& anchor, bool stands, double heading_std);
 
 }  // namespace roadfix::navigation

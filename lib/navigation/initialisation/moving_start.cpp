@@ -134,11 +134,9 @@ MovingStart::Started MovingStart::go_through(const NavigationConfig& config, con
 MovingStart::Beginning MovingStart::beginning_of(const Mean& end) const {
   const auto carried = [&](const Eigen::Quaterniond& q) {
     Mean x = mean_at(end, q, Eigen::Vector3d::Zero(), imu_.front().t_us);
-    inertial::InertialStep last;
-    BodyMotion motion;
-    inertial::Earth earth;
+    Propagation propagation{inertial::Earth()};
     for (size_t i = 1; i < imu_.size(); ++i)
-      integrate(x, last, motion, earth, imu_[i], seconds_between(imu_[i - 1].t_us, imu_[i].t_us));
+      propagation.move(x, imu_[i], seconds_between(imu_[i - 1].t_us, imu_[i].t_us));
     return x.nav;
   };
   const Eigen::Quaterniond q = end.nav.q_level_imu * carried(Eigen::Quaterniond::Identity()).q_level_imu.conjugate();

@@ -1,7 +1,7 @@
 // The states of what a receiver brings back from an outage: how they move together, and that they leave no trace.
 #include <catch2/catch.hpp>
 
-#include "navigation/filter.h"
+#include "navigation/aiding/gnss_error_states.h"
 
 using namespace roadfix;
 using namespace roadfix::navigation;
@@ -12,7 +12,7 @@ namespace {
 Filter half_a_second(double rate_off) {
   Filter filter(NavigationConfig(), inertial::Earth(), false);
   filter.initialise(Mean(), BaseVector::Constant(0.1));
-  filter.begin_return({3.0, 3.0, 6.0});
+  begin_gnss_return(filter, {3.0, 3.0, 6.0});
   filter.state().x.gnss_return = {2.0, -1.0, 0.5};
   filter.state().x.return_rate += rate_off;
   for (int i = 1; i <= 50; ++i) {
@@ -45,10 +45,10 @@ TEST_CASE("what a receiver brought back fades, and its rate's error goes over to
 
 TEST_CASE("a return that is over leaves nothing of itself") {
   Filter f = half_a_second(0.0);
-  CHECK(f.returning());
-  CHECK(f.return_size() > 1.0);
-  f.end_return();
-  CHECK_FALSE(f.returning());
+  CHECK(f.state().gnss_returns());
+  CHECK(gnss_return_size(f.state()) > 1.0);
+  end_gnss_return(f);
+  CHECK_FALSE(f.state().gnss_returns());
   CHECK(f.state().x.gnss_return.isZero(0.0));
   CHECK(f.state().P().middleCols<4>(kGnssReturn).isZero(0.0));
   CHECK(f.state().P().middleRows<4>(kGnssReturn).isZero(0.0));

@@ -191,7 +191,8 @@ void CameraControl::add_pose(Filter& filter, int64_t id, int64_t t_us) const {
   const Mean& x = state.x;
   state.move_reference(x.nav.position);
   // Over the sample that the picture lies in: a smoothed rate would miss a hundredth of a radian of a rough road.
-  const Eigen::Vector3d rate = filter.last_step().rate - x.nav.q_level_imu.conjugate() * filter.earth().rate();
+  const Eigen::Vector3d rate =
+      filter.propagation().last_step().rate - x.nav.q_level_imu.conjugate() * filter.earth().rate();
   state.add_clone(id, rate, stamps_.jitter());
   // From the imu's epoch to the picture's moment.
   const double dt = seconds_between(x.t_us, t_us);

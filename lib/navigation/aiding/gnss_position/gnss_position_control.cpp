@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "navigation/aiding/gnss_error_states.h"
 #include "navigation/aiding/gnss_position/gnss_position_model.h"
 
 namespace roadfix::navigation {
@@ -48,7 +49,8 @@ Eigen::Vector2d off_way(const Filter& filter, const Queued& fix) {
 
 /// What a receiver brought back has faded.
 void settle(Filter& filter, const Queued& fix) {
-  if (filter.returning() && filter.return_size() < kSettled * std::sqrt(fix.cov(0, 0))) filter.end_return();
+  const State& s = filter.state();
+  if (s.gnss_returns() && gnss_return_size(s) < kSettled * std::sqrt(fix.cov(0, 0))) end_gnss_return(filter);
 }
 
 const Eigen::Vector3d kReturn(kReturnLevel, kReturnLevel, kReturnUp);
@@ -123,14 +125,14 @@ void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
   set_noise(filter, bias);
   const bool other_share = share_ > 0.0 && bias.like.share != share_;
   if (!bias.anew && other_share && config_.facts.has_imu && !displaced())
-    filter.rescale_gnss_bias(kGnssBias, bias.like.share / share_);
+    rescale_gnss_bias(filter, kGnssBias, bias.like.share / share_);
   share_ = bias.like.share;
   begin(filter, bias);
 }
 
 void GnssPositionControl::begin(Filter& filter, const Bias& bias) const {
-  if (bias.anew) filter.reset_block(kGnssBias, Eigen::Vector3d::Zero(), bias.std);
-  if (bias.returns) filter.begin_return(kReturn);
+  if (bias.anew) reset_gnss_bias(filter, bias.std);
+  if (bias.returns) begin_gnss_return(filter, kReturn);
 }
 
 AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) const {
@@ -187,7 +189,7 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   error_time_.clear();
   const Eigen::Vector2d before = off_way(filter, fix);
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
-  if (r.status == AidingStatus::kGated && filter.returning() && jumped_back(filter, fix, bias)) {
+  if (r.status == AidingStatus::kGated && filter.state().gnss_returns() && jumped_back(filter, fix, bias)) {
     bias.returns = true;
     r.status = AidingStatus::kAccepted;
   }
@@ -268,7 +270,7 @@ void GnssPositionControl::watch(const Filter& filter, const Queued& fix, const B
                                 const Eigen::Vector2d& before) {
   LastingErrorModels& models = receivers_[static_cast<size_t>(fix.fix_type)].lasting;
   if (bias.anew) models.begin_anew();
-  if (!config_.aiding.lasting_errors || displaced() || filter.returning()) return models.begin_anew();
+  if (!config_.aiding.lasting_errors || displaced() || filter.state().gnss_returns()) return models.begin_anew();
   const Eigen::Array2d velocity = filter.state().P().diagonal().segment<2>(kVel);
   models.add({fix.t_us, before, off_way(filter, fix), fix.cov.diagonal().head<2>(),
               2.0 * kVelocityTime * velocity + kLeastDrift * kLeastDrift});

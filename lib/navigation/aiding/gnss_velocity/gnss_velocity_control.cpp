@@ -1,6 +1,7 @@
 #include "navigation/aiding/gnss_velocity/gnss_velocity_control.h"
 
 #include "geometry/so3.h"
+#include "navigation/aiding/gnss_error_states.h"
 #include "navigation/aiding/gnss_velocity/gnss_velocity_model.h"
 
 namespace roadfix::navigation {
@@ -76,7 +77,7 @@ void GnssVelocityControl::watch(Filter& filter, const Queued& velocity, const Ei
   const double share = models_.mean().share;
   models_.add(
       {velocity.t_us, before, off_way(filter, velocity), velocity.cov.diagonal().head<2>(), drift_rate(filter)});
-  filter.rescale_gnss_bias(kGnssVelocityBias, models_.mean().share / share);
+  rescale_gnss_bias(filter, kGnssVelocityBias, models_.mean().share / share);
 }
 
 AidingRecord GnssVelocityControl::try_on(Filter& filter, const Queued& velocity) const {

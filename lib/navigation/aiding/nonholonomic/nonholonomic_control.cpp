@@ -2,6 +2,7 @@
 
 #include "navigation/aiding/nonholonomic/nonholonomic_model.h"
 #include "navigation/aiding/second_order.h"
+#include "navigation/aiding/wheel_speed/wheel_speed_control.h"
 
 namespace roadfix::navigation {
 
@@ -19,6 +20,11 @@ double acceleration_of(const Filter& filter, int axis) {
 }
 
 }  // namespace
+
+bool NonholonomicControl::joins(bool wheels, int64_t t_us) {
+  if (wheels) wheels_at_us_ = t_us;
+  return wheels || seconds_between(wheels_at_us_, t_us) > WheelSpeedControl::kSilent;
+}
 
 bool NonholonomicControl::due(int axis, int64_t t_us) {
   if (!config_.sources.nonholonomic || config_.facts.mounting_std.tail<2>().maxCoeff() > kMountingKnown) return false;

@@ -15,6 +15,10 @@ class NonholonomicControl {
         lateral_(config.nonholonomic, vehicle::NonholonomicNoise::Axis::kLateral),
         vertical_(config.nonholonomic, vehicle::NonholonomicNoise::Axis::kVertical) {}
 
+  /// Where wheel speeds come, the constraint joins them: one epoch of updates instead of two. `wheels`: one has just come.
+  [[nodiscard]] bool joins(bool wheels, int64_t t_us);
+  /// Wheel speeds have come.
+  [[nodiscard]] bool with_wheels() const { return wheels_at_us_ != 0; }
   /// True when the constraint of this axis (1 lateral, 2 vertical) is due at t_us; counts it as used.
   bool due(int axis, int64_t t_us);
   /// `learn`: fixes show the truth beside it.
@@ -25,7 +29,7 @@ class NonholonomicControl {
   void serialise(Archive& a) {
     lateral_.serialise(a);
     vertical_.serialise(a);
-    a(next_us_[0], next_us_[1]);
+    a(next_us_[0], next_us_[1], wheels_at_us_);
   }
 
  private:
@@ -36,6 +40,7 @@ class NonholonomicControl {
   Gates gates_;
   vehicle::NonholonomicNoise lateral_, vertical_;
   std::array<int64_t, 2> next_us_{};
+  int64_t wheels_at_us_ = 0;
 };
 
 }  // namespace roadfix::navigation

@@ -8,6 +8,8 @@ namespace roadfix::navigation {
 
 class WheelSpeedControl {
  public:
+  static constexpr double kSilent = 0.3;  ///< s without a wheel speed: longer, and there is none
+
   explicit WheelSpeedControl(const NavigationConfig& config)
       : detects_steps_(config.aiding.step_detection),
         interval_(config.aiding.wheel_interval),

@@ -1,0 +1,34 @@
+#include "navigation/measurement_input.h"
+
+namespace roadfix::navigation {
+
+namespace {
+
+constexpr double kWheelPeriodSlack = 0.005;  // s
+
+}  // namespace
+
+AidingStatus MeasurementInput::screen(const GnssFix& fix) {
+  const bool again = fix.t_us == last_fix_us_ && fix.antenna.latitude == last_fix_.latitude &&
+                     fix.antenna.longitude == last_fix_.longitude && fix.antenna.height == last_fix_.height;
+  return again ? AidingStatus::kBadInput : screen_.check(fix);
+}
+
+void MeasurementInput::add(const GnssFix& fix, int64_t id, const Geodetic& anchor) {
+  last_fix_us_ = fix.t_us;
+  last_fix_ = fix.antenna;
+  const QueuedFix all = queued(fix, id, EnuAnchor(anchor), config_);
+  for (const std::optional<Queued>& q : {all.position, all.velocity, all.heading})
+    if (q) queue_.push(*q);
+}
+
+void MeasurementInput::add(const Queued& q) {
+  const bool wheels = q.kind == Queued::Kind::kWheels;
+  int64_t& last_us = wheels ? last_wheel_us_ : last_magnetic_us_;
+  const double interval = wheels ? config_.aiding.wheel_interval - kWheelPeriodSlack : config_.aiding.magnetic_interval;
+  if (seconds_between(last_us, q.t_us) < interval) return;
+  last_us = q.t_us;
+  queue_.push(q);
+}
+
+}  // namespace roadfix::navigation
