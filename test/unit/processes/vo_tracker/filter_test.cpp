@@ -87,9 +87,8 @@ TEST_CASE("mode filter: valid while parked, then tracks the street") {
   CHECK(last.scale == pose_t::SCALE_METRIC);
   CHECK(last.origin == pose_t::ORIGIN_IMU);
   CHECK(last.position_m[0] == Approx(kCar.distance(seconds(last.utime))).epsilon(0.03));
-  CHECK(last.velocity_mps[0] ==
-        Approx(kCar.top_speed).epsilon(0.08));  // the scale is not observed yet, without turn and
-                                                // wheels
+  // The scale is not observed yet, without turn and wheels.
+  CHECK(last.velocity_mps[0] == Approx(kCar.top_speed).epsilon(0.08));
   CHECK(std::abs(last.velocity_mps[0] - kCar.top_speed) < 4.0 * std::sqrt(last.cov_velocity_m2ps2[0][0]) + 0.1);
   CHECK(statuses.back().mode == vo_status_t::MODE_MSCKF);
   CHECK(statuses.back().state == vo_status_t::STATE_GOOD);
