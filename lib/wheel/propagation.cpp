@@ -170,7 +170,7 @@ WheelCovariance transition(const WheelVector& x, const WheelStep& step) {
 Eigen::Vector3d gravity_reaction(const WheelVector& x, const GravityMeasurement& gravity) {
   Eigen::Vector3d force = unbiased(x, gravity.force);
   if (!gravity.correct_acceleration) return force;
-  return force - axle_acceleration(x(kSpeed), gravity.speed_rate, body_rate(x, gravity.gyro),
+  return force - axle_acceleration(x(kSpeed), (1.0 + x(kWheelScale)) * gravity.speed_rate, body_rate(x, gravity.gyro),
                                    travel_direction(x(kMountingYaw), x(kMountingPitch)));
 }
 
@@ -186,13 +186,15 @@ WheelCovariance levelling_jacobian(const WheelVector& x, const GravityMeasuremen
   Eigen::Matrix<double, 3, kWheelStates> force_rows = Eigen::Matrix<double, 3, kWheelStates>::Zero();
   force_rows.block<2, 2>(0, kAccelBias) = -Eigen::Matrix2d::Identity();
   if (gravity.correct_acceleration) {
-    // Derivatives by speed, gyro bias and scale, and direction of travel.
+    // Derivatives by speed, wheel scale, gyro bias and scale, and direction of travel.
     const Eigen::Vector3d omega = body_rate(x, gravity.gyro), e = travel_direction(x(kMountingYaw), x(kMountingPitch));
     const Eigen::Matrix<double, 3, 2> by_angles = travel_direction_jacobian(x(kMountingYaw), x(kMountingPitch));
     force_rows.col(kSpeed) = -omega.cross(e);
+    force_rows.col(kWheelScale) = -gravity.speed_rate * e;
     force_rows += x(kSpeed) * skew(e) * body_rate_jacobian(x, gravity.gyro);
     force_rows.middleCols<2>(kMountingYaw) -=
-        (gravity.speed_rate * Eigen::Matrix3d::Identity() + x(kSpeed) * skew(omega)) * by_angles;
+        ((1.0 + x(kWheelScale)) * gravity.speed_rate * Eigen::Matrix3d::Identity() + x(kSpeed) * skew(omega)) *
+        by_angles;
   }
   WheelCovariance F = WheelCovariance::Identity();
   F.block<2, 2>(kRoll, kRoll) *= 1.0 - gravity.share;
