@@ -5,9 +5,8 @@ namespace roadfix {
 using namespace wheel;  // indices of the error state
 namespace {
 
-constexpr double kFirstBiasGate = 6.6;  ///< squared sigma, 99 %, first mean of a standstill: beyond it the vehicle
-                                        ///< turns
-constexpr double kBiasGate = 25.0;      ///< squared sigma, later means, of which there may be hundreds
+constexpr double kFirstYawGate = 6.6;  ///< squared sigma, 99 %, first mean of a standstill: beyond it the vehicle turns
+constexpr double kBiasGate = 25.0;     ///< squared sigma, all others, of which there may be hundreds
 
 }  // namespace
 
@@ -23,7 +22,7 @@ void ZeroRateUpdate::update(WheelState& state) {
   const Eigen::Vector3d difference = angle_ / time_ - state.x.segment<3>(kGyroBias);
   for (int i = 0; i < 3; ++i) {
     const double d = difference(i), S = state.P(kGyroBias + i, kGyroBias + i) + variance;
-    const bool no_bias = d * d > (tested_ ? kBiasGate : kFirstBiasGate) * S;
+    const bool no_bias = d * d > (i == 2 && !tested_ ? kFirstYawGate : kBiasGate) * S;
     if (i == 2 && no_bias) turning_ = true;
     if (no_bias || (i == 2 && turning_)) continue;
     WheelVector H = WheelVector::Zero();

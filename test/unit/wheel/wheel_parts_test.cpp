@@ -112,12 +112,12 @@ TEST_CASE("the bias about z belongs to the selected source of yaw rate") {
 }
 
 /// Means of one axis' rate at standstill over 20 s, the prior sigma of the bias as given.
-WheelState stood(double rate, double prior, ZeroRateUpdate& update) {
+WheelState stood(double rate, double prior, ZeroRateUpdate& update, int axis = 2) {
   WheelState state;
   for (int i = 0; i < 3; ++i) decouple(state.P, kGyroBias + i, prior);
   update.begin();
   for (int i = 0; i < 2000; ++i) {
-    update.add(0.01, Eigen::Vector3d(0.0, 0.0, rate));
+    update.add(0.01, rate * Eigen::Vector3d::Unit(axis));
     if (i % 50 == 49) update.update(state);
   }
   return state;
@@ -133,6 +133,15 @@ TEST_CASE("at standstill the mean rate is the bias, unless it is beyond any plau
   CHECK(update.turning());
   update.begin();
   CHECK_FALSE(update.turning());
+}
+
+TEST_CASE("four sigma of a gyro are a bias about the axes across gravity, about the third they may be a turn") {
+  ZeroRateUpdate update(1e-4);
+  CHECK(stood(0.004, 1e-3, update, 1).x(kGyroBias + 1) == Approx(0.004).epsilon(1e-2));
+  CHECK_FALSE(update.turning());
+  CHECK(stood(0.006, 1e-3, update, 1).x(kGyroBias + 1) == 0.0);
+  CHECK(stood(0.004, 1e-3, update, 2).x(kGyroBias + 2) == 0.0);
+  CHECK(update.turning());
 }
 
 /// Whether a second of wheels at rest is a standstill, the gyro's rate about z as given, a sample each 10 ms.
