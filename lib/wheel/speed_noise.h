@@ -1,4 +1,4 @@
-/// Noise of wheel speeds, with the rounding of a bus that carries them in steps (MODEL.md (W.6.3)).
+/// Noise of wheel speeds, with the rounding of a bus that carries them in steps (MODEL.md (W.6.4)).
 #pragma once
 
 namespace roadfix {

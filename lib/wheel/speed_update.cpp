@@ -17,6 +17,16 @@ WheelVector speed_jacobian(const WheelVector& x) {
   return H;
 }
 
+/// Gain of the speed as if the wheel scale were known (W.6.2).
+WheelVector speed_gain(const WheelCovariance& P, const WheelVector& H, double variance) {
+  const double by_scale =
+      P(kSpeed, kWheelScale) * P(kSpeed, kWheelScale) / std::max(P(kWheelScale, kWheelScale), 1e-12);
+  const double known_scale = std::max(P(kSpeed, kSpeed) - by_scale, 0.0);
+  WheelVector K = WheelVector::Zero();
+  K(kSpeed) = known_scale * H(kSpeed) / (H(kSpeed) * known_scale * H(kSpeed) + variance);
+  return K;
+}
+
 }  // namespace
 
 void WheelSpeedUpdate::observe(const WheelSpeed& z) { noise_.observe(z.value); }
@@ -48,7 +58,7 @@ bool WheelSpeedUpdate::reject_slip(WheelState& state, int64_t t_us, double innov
 WheelInputStatus WheelSpeedUpdate::update(WheelState& state, const WheelSpeed& z, double acceleration, double dt_s) {
   const double variance = std::pow(noise_.of_many(dt_s), 2);
   const WheelVector H = speed_jacobian(state.x);
-  // (W.6.2): the state may be slightly older.
+  // (W.6.3): the state may be slightly older.
   const double predicted =
       (state.x(kSpeed) + acceleration * seconds_between(state.t_us, z.t_us)) / (1.0 + state.x(kWheelScale));
   const double S = H.dot(state.P * H) + variance;
@@ -61,7 +71,7 @@ WheelInputStatus WheelSpeedUpdate::update(WheelState& state, const WheelSpeed& z
   }
   const double innovation = *speed - predicted;
   if (reject_slip(state, z.t_us, innovation, S)) return WheelInputStatus::kSlip;
-  schmidt_update(state, H, innovation, variance, {kSpeed});
+  update_by_gain(state, H, speed_gain(state.P, H, variance), innovation, variance);
   return WheelInputStatus::kUsed;
 }
 

@@ -49,4 +49,7 @@ void decouple(WheelCovariance& P, int index, double sigma);
 void schmidt_update(WheelState& state, const WheelVector& H, double innovation, double variance,
                     std::initializer_list<int> corrected);
 
+/// The same with a gain of any kind, for which Joseph's form holds as well.
+void update_by_gain(WheelState& state, const WheelVector& H, const WheelVector& K, double innovation, double variance);
+
 }  // namespace roadfix

@@ -56,6 +56,28 @@ TEST_CASE("a wheel speed corrects the speed, slip does not, until it has lasted 
   CHECK(state.x(kSpeed) == Approx(14.0).margin(0.1));
 }
 
+TEST_CASE("a wheel speed never drives the speed away from it, whatever the accelerometer tells of the scale") {
+  // 29 m/s by wheels of 1 % scale, then accelerated by 4 m/s: the speed's error is still that of 29 m/s.
+  const double scale = 0.01, speed = 29.0;
+  WheelState state;
+  state.x(kSpeed) = speed + 4.0;
+  state.P(kWheelScale, kWheelScale) = scale * scale;
+  state.P(kSpeed, kSpeed) = std::pow(speed * scale, 2) + 1e-4;
+  state.P(kSpeed, kWheelScale) = state.P(kWheelScale, kSpeed) = speed * scale * scale;
+  WheelVector H = WheelVector::Zero();
+  H(kSpeed) = 1.0;
+  H(kWheelScale) = -state.x(kSpeed);
+  WheelState by_schmidt = state;
+  schmidt_update(by_schmidt, H, 0.1, 1e-3, {kSpeed});
+  CHECK(by_schmidt.x(kSpeed) < state.x(kSpeed));
+
+  WheelSpeedUpdate update(WheelConfig{});
+  REQUIRE(update.update(state, {0, state.x(kSpeed) + 0.1}, 0.0, 0.05) == WheelInputStatus::kUsed);
+  CHECK(state.x(kSpeed) > speed + 4.0);
+  CHECK(state.x(kSpeed) < speed + 4.1);
+  CHECK(state.P(kSpeed, kSpeed) > 0.0);
+}
+
 TEST_CASE("the state is older than the wheel speed by the acceleration in between") {
   WheelSpeedUpdate update(WheelConfig{});
   WheelState state = moving();
