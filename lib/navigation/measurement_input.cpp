@@ -22,12 +22,18 @@ void MeasurementInput::add(const GnssFix& fix, int64_t id, const Geodetic& ancho
     if (q) queue_.push(*q);
 }
 
-void MeasurementInput::add(const Queued& q) {
+void MeasurementInput::add(Queued q) {
   const bool wheels = q.kind == Queued::Kind::kWheels;
   int64_t& last_us = wheels ? last_wheel_us_ : last_magnetic_us_;
   const double interval = wheels ? config_.aiding.wheel_interval - kWheelPeriodSlack : config_.aiding.magnetic_interval;
-  if (seconds_between(last_us, q.t_us) < interval) return;
+  const double since = seconds_between(last_us, q.t_us);
+  if (since < interval) return;
   last_us = q.t_us;
+  if (wheels) {
+    const double rounding = rounding_.of_many(since), track_width = config_.facts.wheels.track_width;
+    q.cov(0, 0) += rounding * rounding;
+    q.cov(2, 2) += 2.0 * rounding * rounding / (track_width * track_width);
+  }
   queue_.push(q);
 }
 

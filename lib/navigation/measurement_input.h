@@ -4,6 +4,7 @@
 
 #include "navigation/aiding/gnss_screen.h"
 #include "navigation/input_adapter.h"
+#include "vehicle/speed_rounding.h"
 
 namespace roadfix::navigation {
 
@@ -15,8 +16,10 @@ class MeasurementInput {
   AidingStatus screen(const GnssFix& fix);
   /// A fix that passed, in the enu frame of `anchor`.
   void add(const GnssFix& fix, int64_t id, const Geodetic& anchor);
+  /// Every sample of the wheels, before it is added.
+  void see(const WheelSample& wheels) { rounding_.observe(wheels); }
   /// Of the wheels or the magnetometer.
-  void add(const Queued& q);
+  void add(Queued q);
 
   [[nodiscard]] MeasurementQueue& queue() { return queue_; }
   [[nodiscard]] const GnssScreen& gnss() const { return screen_; }
@@ -27,6 +30,7 @@ class MeasurementInput {
   void serialise(Archive& a) {
     screen_.serialise(a);
     queue_.serialise(a);
+    rounding_.serialise(a);
     a(last_fix_us_, last_fix_.latitude, last_fix_.longitude, last_fix_.height, last_wheel_us_, last_magnetic_us_);
   }
 
@@ -34,6 +38,7 @@ class MeasurementInput {
   NavigationConfig config_;
   GnssScreen screen_;
   MeasurementQueue queue_;
+  vehicle::SpeedRounding rounding_;
   int64_t last_fix_us_ = 0;
   Geodetic last_fix_;
   int64_t last_wheel_us_ = 0, last_magnetic_us_ = 0;

@@ -95,6 +95,7 @@ void Navigation::take(const WheelSample& wheels, int64_t id) {
   const std::optional<Queued> q = queued(wheels, id, config_);
   if (!q) return log_.add(record_of(AidingSource::kWheelSpeed, AidingStatus::kBadInput, wheels.t_us), id);
   start_.add(*q);
+  measurements_.see(wheels);
   measurements_.add(*q);
 }
 

@@ -29,8 +29,6 @@ WheelVector speed_gain(const WheelCovariance& P, const WheelVector& H, double va
 
 }  // namespace
 
-void WheelSpeedUpdate::observe(const WheelSpeed& z) { noise_.observe(z.value); }
-
 double WheelSpeedUpdate::signed_speed(const WheelSpeed& z) const {
   return (z.magnitude_only && direction_.sign < 0 ? -1.0 : 1.0) * z.value;
 }
@@ -56,7 +54,7 @@ bool WheelSpeedUpdate::reject_slip(WheelState& state, int64_t t_us, double innov
 }
 
 WheelInputStatus WheelSpeedUpdate::update(WheelState& state, const WheelSpeed& z, double acceleration, double dt_s) {
-  const double variance = std::pow(noise_.of_many(dt_s), 2);
+  const double variance = std::pow(std::hypot(config_.sensors.wheel_noise, rounding_.of_many(dt_s)), 2);
   const WheelVector H = speed_jacobian(state.x);
   // (W.6.3): the state may be slightly older.
   const double predicted =

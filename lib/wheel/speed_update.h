@@ -2,8 +2,10 @@
 /// sections 6 and 8).
 #pragma once
 
+#include <cmath>
+
+#include "vehicle/speed_rounding.h"
 #include "wheel/direction.h"
-#include "wheel/speed_noise.h"
 #include "wheel/wheel_config.h"
 #include "wheel/wheel_report.h"
 #include "wheel/wheel_state.h"
@@ -19,10 +21,10 @@ struct WheelSpeed {
 
 class WheelSpeedUpdate {
  public:
-  explicit WheelSpeedUpdate(const WheelConfig& config) : config_(config), noise_(config.sensors.wheel_noise) {}
+  explicit WheelSpeedUpdate(const WheelConfig& config) : config_(config) {}
 
-  /// Every received speed, before anything else is done with it.
-  void observe(const WheelSpeed& z);
+  /// Every received sample, before anything else is done with it.
+  void observe(const WheelSample& wheels) { rounding_.observe(wheels); }
   /// Updates the speed alone. `acceleration`: m/s2, of the state, along the direction of travel; `dt_s`: since the
   /// sample before.
   WheelInputStatus update(WheelState& state, const WheelSpeed& z, double acceleration, double dt_s);
@@ -39,11 +41,12 @@ class WheelSpeedUpdate {
   [[nodiscard]] double signed_speed(const WheelSpeed& z) const;
   [[nodiscard]] bool slipping() const { return slip_since_us_.has_value(); }
   [[nodiscard]] const DirectionState& direction() const { return direction_; }
-  [[nodiscard]] const WheelSpeedNoise& noise() const { return noise_; }
+  /// Standard deviation of one sample alone, m/s.
+  [[nodiscard]] double sigma_of_one() const { return std::hypot(config_.sensors.wheel_noise, rounding_.of_one()); }
 
   template <class Archive>
   void serialise(Archive& a) {
-    noise_.serialise(a);
+    rounding_.serialise(a);
     a(direction_.sign, direction_.assumed, direction_.undecided_since_us, slip_since_us_);
   }
 
@@ -53,7 +56,7 @@ class WheelSpeedUpdate {
   [[nodiscard]] bool reject_slip(WheelState& state, int64_t t_us, double innovation, double S);
 
   WheelConfig config_;
-  WheelSpeedNoise noise_;
+  vehicle::SpeedRounding rounding_;
   DirectionState direction_;
   std::optional<int64_t> slip_since_us_;
 };

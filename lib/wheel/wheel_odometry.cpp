@@ -61,7 +61,7 @@ WheelInputStatus WheelOdometry::add(const WheelSample& wheels) {
   if (!first_wheels_us_) first_wheels_us_ = wheels.t_us;
   const WheelSpeed z{wheels.t_us, motion->speed, wheels.direction == WheelDirection::kUnknown};
   yaw_rate_.add(*motion);
-  speed_.observe(z);
+  speed_.observe(wheels);
   return started_ ? update(z) : align(z);
 }
 
@@ -163,7 +163,7 @@ void WheelOdometry::level_by_wheels(double dt_s) {
 }
 
 LevellingMotion WheelOdometry::levelling_motion() const {
-  return {speed_.noise().of_one(), standstill_.standing(), speed_.slipping()};
+  return {speed_.sigma_of_one(), standstill_.standing(), speed_.slipping()};
 }
 
 /// Before the first IMU sample: since the first wheel sample.

@@ -61,7 +61,7 @@ class WheelOdometryStage final : public Stage {
                     {"WHEELS", "wheels_t", 50'000, 0},
                     {"MAG", "mag_t", 50'000, 0},
                     {"START_WHEEL_ODOMETRY", "state_t", 0, 0}};
-    spec_.state_layout = 6;
+    spec_.state_layout = 7;
     spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_WHEEL", "pose_t"}};
   }

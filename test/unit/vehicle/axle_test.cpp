@@ -6,6 +6,7 @@
 #include "vehicle/axle_speed.h"
 #include "vehicle/axle_velocity.h"
 #include "vehicle/nonholonomic_noise.h"
+#include "vehicle/speed_rounding.h"
 
 using namespace roadfix;
 using namespace roadfix::vehicle;
@@ -70,5 +71,23 @@ TEST_CASE("the constraint's noise is found among the filter's own errors") {
     }
     CHECK(noise.sigma(0.0) > truth);
     CHECK(noise.sigma(0.0) < 1.8 * truth);
+  }
+}
+
+TEST_CASE("speeds in steps have the noise of their rounding, others none") {
+  for (const double step : {0.0, 0.06}) {
+    SpeedRounding rounding;
+    CHECK(rounding.of_one() == 0.0);
+    for (int i = 0; i < 200; ++i) {
+      WheelSample wheels;
+      const double speed = 10.0 + 3.0 * std::sin(0.1 * i);
+      wheels.speeds[0] = step > 0.0 ? step * std::round(speed / step) : speed;
+      rounding.observe(wheels);
+    }
+    CAPTURE(step);
+    CHECK(rounding.of_one() == Approx(step / std::sqrt(12.0)).margin(5e-4));
+    // Of twenty samples a second, one carries a twentieth of what a second tells of the rounding error.
+    CHECK(rounding.of_many(0.05) == Approx(step * std::sqrt(20.0 / 12.0)).margin(2e-3));
+    CHECK(rounding.of_many(5.0) == rounding.of_one());
   }
 }

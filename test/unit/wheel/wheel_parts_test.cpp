@@ -14,21 +14,6 @@ namespace roadfix {
 using namespace wheel;  // indices of the error state
 namespace {
 
-TEST_CASE("speeds in steps have the noise of their rounding, others none") {
-  for (const double step : {0.0, 0.06}) {
-    WheelSpeedNoise noise(0.03);
-    for (int i = 0; i < 200; ++i) {
-      const double speed = 10.0 + 3.0 * std::sin(0.1 * i);
-      noise.observe(step > 0.0 ? step * std::round(speed / step) : speed);
-    }
-    CAPTURE(step);
-    CHECK(noise.of_one() == Approx(std::hypot(0.03, step / std::sqrt(12.0))).epsilon(1e-3));
-    // Of twenty samples a second, one carries a twentieth of what a second tells of the rounding error.
-    CHECK(noise.of_many(0.05) == Approx(std::hypot(0.03, step * std::sqrt(20.0 / 12.0))).epsilon(2e-3));
-    CHECK(noise.of_many(5.0) == noise.of_one());
-  }
-}
-
 /// A state at 10 m/s, known to 0.1 m/s, of a calibrated wheel scale.
 WheelState moving() {
   WheelState state;
