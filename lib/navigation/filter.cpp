@@ -152,8 +152,7 @@ Eigen::Matrix<double, Rows, 1> Filter::residual(const Measurement<Rows>& m) cons
 template <int Rows>
 void Filter::reject(const Measurement<Rows>& m) {
   const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
-  if (innovation.usable)
-    steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened, m.shows_antenna);
+  if (innovation.usable) steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened, m.shows_antenna);
 }
 
 template <int Rows>

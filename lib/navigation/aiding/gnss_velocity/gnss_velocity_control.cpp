@@ -18,7 +18,8 @@ constexpr double kLeastDrift = 0.01;  // m/s/sqrt(s), of a velocity that the imu
 /// (m/s2)^2, level, of what the imu says by tilt and accelerometer biases.
 Eigen::Vector3d acceleration_variance(const Filter& filter) {
   const State& s = filter.state();
-  const Eigen::Vector3d force = filter.motion().acceleration - inertial::Earth(filter.earth()).gravity(s.x.nav.position);
+  const Eigen::Vector3d force =
+      filter.motion().acceleration - inertial::Earth(filter.earth()).gravity(s.x.nav.position);
   Eigen::Matrix<double, 3, 6> H;  // of the acceleration by attitude and accelerometer bias
   H << -skew(force), -s.x.R();
   Eigen::Matrix<double, 6, 6> P;
