@@ -44,7 +44,7 @@ SmoothingTime learnt(const Receiver& receiver, double most, double duration, uns
     lag.advance(velocity - before, kImu);
     if (i % fix != 0) continue;
     const Eigen::Vector3d a = acceleration_at(i * kImu, most);
-    const SmoothingTime::Expected e = time.expected(lag, a, Eigen::Vector3d::Zero());
+    const SmoothingTime::Expected e = time.expected(lag, a);
     const Eigen::Vector3d innovation =
         told.front() + Eigen::Vector3d(n(rng), n(rng), n(rng)) - (velocity + e.lag - late * e.rate);
     const Eigen::Vector3d variance =
@@ -63,7 +63,7 @@ SmoothingTime learnt(const Receiver& receiver, double most, double duration, uns
       late += gain * along.dot(innovation);
       late_variance *= 1.0 + gain * speed;
     }
-    late += time.learn(r, lag, a, Eigen::Vector3d::Zero(), late_before);
+    late += time.learn(r, lag, a, late_before);
   }
   if (latency != nullptr) *latency = late;
   return time;

@@ -15,22 +15,16 @@ constexpr double kOutage = 3.0;       // s without a velocity, over which nothin
 constexpr double kTiltTime = 10.0;    // s, for which tilt and biases of an aided filter are off by the same
 constexpr double kLeastDrift = 0.01;  // m/s/sqrt(s), of a velocity that the imu carries
 
-/// (m/s2)^2, level, of what the imu says by tilt and accelerometer biases.
-Eigen::Vector3d acceleration_variance(const Filter& filter) {
+/// m2/s3, level: by how much the propagated velocity may drift, as a random walk.
+Eigen::Vector2d drift_rate(Filter& filter) {
   const State& s = filter.state();
-  const Eigen::Vector3d force =
-      filter.motion().acceleration - inertial::Earth(filter.earth()).gravity(s.x.nav.position);
-  Eigen::Matrix<double, 3, 6> H;  // of the acceleration by attitude and accelerometer bias
-  H << -skew(force), -s.x.R();
+  const Eigen::Vector3d force = filter.motion().acceleration - filter.earth().gravity(s.x.nav.position);
+  Eigen::Matrix<double, 2, 6> H;  // of the acceleration by attitude and accelerometer bias
+  H << -skew(force).topRows<2>(), -s.x.R().topRows<2>();
   Eigen::Matrix<double, 6, 6> P;
   P << s.P().block<3, 3>(kAtt, kAtt), s.P().block<3, 3>(kAtt, kAccelBias), s.P().block<3, 3>(kAccelBias, kAtt),
       s.P().block<3, 3>(kAccelBias, kAccelBias);
-  return (H * P * H.transpose()).diagonal();
-}
-
-/// m2/s3, level: by how much the propagated velocity may drift, as a random walk.
-Eigen::Vector2d drift_rate(const Filter& filter) {
-  return (2.0 * kTiltTime * acceleration_variance(filter).head<2>().array() + kLeastDrift * kLeastDrift).matrix();
+  return (2.0 * kTiltTime * (H * P * H.transpose()).diagonal().array() + kLeastDrift * kLeastDrift).matrix();
 }
 
 }  // namespace
@@ -41,8 +35,7 @@ LastingError GnssVelocityControl::lasting() const {
 }
 
 Measurement<3> GnssVelocityControl::measurement(const Filter& filter, const Queued& velocity, double white) const {
-  const SmoothingTime::Expected smoothed =
-      smoothing_.expected(filter.motion().lag, filter.motion().acceleration, acceleration_variance(filter));
+  const SmoothingTime::Expected smoothed = smoothing_.expected(filter.motion().lag, filter.motion().acceleration);
   BodyMotion motion = filter.motion();
   motion.acceleration = smoothed.rate;
   motion.acceleration.z() = 0.0;  // the road's unevenness, over before a latency has passed
@@ -71,13 +64,13 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
 AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {
   const Eigen::Vector2d before = off_way(filter, velocity);
   const double latency = filter.state().x.velocity_latency;
-  const Eigen::Vector3d acceleration = filter.motion().acceleration, variance = acceleration_variance(filter);
+  const Eigen::Vector3d acceleration = filter.motion().acceleration;
   const AidingRecord r = fuse(filter, velocity, gates_.nis[3]);
   rejected_ = r.status == AidingStatus::kGated ? rejected_ + 1 : 0;
   if (r.status == AidingStatus::kAccepted || rejected_ >= kPersistent) scale_.learn(r);
   if (r.status != AidingStatus::kAccepted) return r;
   if (lasting_ && has_imu_) watch(filter, velocity, before);
-  filter.state().x.velocity_latency += smoothing_.learn(r, filter.motion().lag, acceleration, variance, latency);
+  filter.state().x.velocity_latency += smoothing_.learn(r, filter.motion().lag, acceleration, latency);
   return r;
 }
 

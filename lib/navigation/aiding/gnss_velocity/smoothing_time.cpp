@@ -19,8 +19,7 @@ SmoothingTime::SmoothingTime(double latency_std) : latency_information_(1.0 / (l
   probability_ = prior_;
 }
 
-SmoothingTime::Expected SmoothingTime::expected(const VelocityLag& lag, const Eigen::Vector3d& acceleration,
-                                                const Eigen::Vector3d& acceleration_variance) const {
+SmoothingTime::Expected SmoothingTime::expected(const VelocityLag& lag, const Eigen::Vector3d& acceleration) const {
   Expected e;
   for (int k = 0; k < VelocityLag::kCount; ++k) {
     e.lag += probability_(k) * lag.lag(k);
@@ -29,7 +28,6 @@ SmoothingTime::Expected SmoothingTime::expected(const VelocityLag& lag, const Ei
   for (int k = 0; k < VelocityLag::kCount; ++k) {
     const Eigen::Vector3d off = lag.lag(k) - e.lag;
     e.spread += probability_(k) * off * off.transpose();
-    e.spread.diagonal() += probability_(k) * VelocityLag::time(k) * VelocityLag::time(k) * acceleration_variance;
   }
   return e;
 }
@@ -41,22 +39,18 @@ SmoothingTime::Each SmoothingTime::latency() const {
 /// The innovation's variance holds the spread too: innovations that follow each other closely are correlated, and it
 /// keeps the first of them from deciding alone.
 double SmoothingTime::learn(const AidingRecord& velocity, const VelocityLag& lag, const Eigen::Vector3d& acceleration,
-                            const Eigen::Vector3d& acceleration_variance, double latency_now) {
-  const Expected e = expected(lag, acceleration, acceleration_variance);
+                            double latency_now) {
+  const Expected e = expected(lag, acceleration);
   const Eigen::Vector3d innovation = Eigen::Map<const Eigen::Vector3d>(velocity.innovation.data());
-  const Eigen::Vector3d variance = Eigen::Map<const Eigen::Vector3d>(velocity.innovation_variance.data());
+  Eigen::Vector3d weight = Eigen::Map<const Eigen::Vector3d>(velocity.innovation_variance.data()).cwiseInverse();
   // Up and down the road's unevenness shows a low pass best, but is over before a latency has passed.
-  const int rows = latency_information_ < 1.0 / (kRoad * kRoad) ? 2 : 3;
+  if (latency_information_ < 1.0 / (kRoad * kRoad)) weight.z() = 0.0;
   for (int k = 0; k < VelocityLag::kCount; ++k) {
     const Eigen::Vector3d a = lag.rate(k, acceleration);
     const Eigen::Vector3d y = innovation + e.lag - lag.lag(k) - latency_now * e.rate;
-    const double T = VelocityLag::time(k);
-    for (int i = 0; i < rows; ++i) {
-      const double S = variance(i) + T * T * acceleration_variance(i);
-      square_(k) += y(i) * y(i) / S + std::log(S / variance(i));
-      by_latency_(k) += a(i) * y(i) / S;
-      information_(k) += a(i) * a(i) / S;
-    }
+    square_(k) += y.cwiseProduct(weight).dot(y);
+    by_latency_(k) += a.cwiseProduct(weight).dot(y);
+    information_(k) += a.cwiseProduct(weight).dot(a);
   }
   const Each own = latency(), before = probability_;
   Each misfit = square_.array() + own.array() * by_latency_.array() +

@@ -19,14 +19,12 @@ class SmoothingTime {
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();    ///< m/s2
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();  ///< (m/s)^2, of the lag
   };
-  /// `acceleration_variance`: (m/s2)^2, of what the imu says by tilt and biases, which a lag has T times.
-  [[nodiscard]] Expected expected(const VelocityLag& lag, const Eigen::Vector3d& acceleration,
-                                  const Eigen::Vector3d& acceleration_variance) const;
+  [[nodiscard]] Expected expected(const VelocityLag& lag, const Eigen::Vector3d& acceleration) const;
 
   /// An accepted velocity whose innovation was found with expected(lag).lag taken out, at this latency (s). Returns by how
   /// much the latency has to change for what is believed of the time constant now.
   [[nodiscard]] double learn(const AidingRecord& velocity, const VelocityLag& lag, const Eigen::Vector3d& acceleration,
-                             const Eigen::Vector3d& acceleration_variance, double latency);
+                             double latency);
   [[nodiscard]] double probability(int k) const { return probability_(k); }
 
   template <class Archive>
