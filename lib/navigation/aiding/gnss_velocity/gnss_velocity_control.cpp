@@ -38,7 +38,6 @@ Measurement<3> GnssVelocityControl::measurement(const Filter& filter, const Queu
   const SmoothingTime::Expected smoothed = smoothing_.expected(filter.motion().lag, filter.motion().acceleration);
   BodyMotion motion = filter.motion();
   motion.acceleration = smoothed.rate;
-  motion.acceleration.z() = 0.0;  // the road's unevenness, over before a latency has passed
   return gnss_velocity(filter.state(), motion, velocity.value - smoothed.lag, white * velocity.cov + smoothed.spread,
                        velocity.ahead(filter.state().x));
 }
@@ -52,8 +51,7 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
   const double factor = scale_.variance_factor();
   const Eigen::Vector3d left = kSmoothing * filter.motion().acceleration;
   Measurement<3> m = measurement(filter, velocity, factor * (1.0 - like.share));
-  m.considered = {kAntenna, 3};  // a smoothed velocity looks like an antenna elsewhere,
-  m.shows_antenna = timed_;      // a late one no less
+  m.considered = {kAntenna, 3};  // a smoothed velocity looks like an antenna elsewhere
   const AidingRecord r = filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
   if (r.status != AidingStatus::kAccepted || !lasting_) return r;
   filter.gnss_bias().velocity_time = 1.0 / like.rate;
@@ -63,14 +61,12 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
 
 AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {
   const Eigen::Vector2d before = off_way(filter, velocity);
-  const double latency = filter.state().x.velocity_latency;
-  const Eigen::Vector3d acceleration = filter.motion().acceleration;
   const AidingRecord r = fuse(filter, velocity, gates_.nis[3]);
   rejected_ = r.status == AidingStatus::kGated ? rejected_ + 1 : 0;
   if (r.status == AidingStatus::kAccepted || rejected_ >= kPersistent) scale_.learn(r);
   if (r.status != AidingStatus::kAccepted) return r;
   if (lasting_ && has_imu_) watch(filter, velocity, before);
-  filter.state().x.velocity_latency += smoothing_.learn(r, filter.motion().lag, acceleration, latency);
+  smoothing_.learn(r, filter.motion().lag);
   return r;
 }
 

@@ -7,16 +7,14 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kNone = 0.5;           // probability of no low pass, before anything is known
-constexpr double kRoad = 0.01;          // s, a latency that a car's bouncing of 1.5 Hz does not show
-constexpr double kMostEvidence = 27.6;  // twice the logarithm of the least probability, 1e-6: evidence can always turn
+constexpr double kNone = 0.5;    // probability of no low pass, before anything is known
+constexpr double kLeast = 1e-6;  // of each: evidence can always turn
 
 }  // namespace
 
-SmoothingTime::SmoothingTime(double latency_std) : latency_information_(1.0 / (latency_std * latency_std)) {
-  prior_.setConstant((1.0 - kNone) / (VelocityLag::kCount - 1));
-  prior_(0) = kNone;
-  probability_ = prior_;
+SmoothingTime::SmoothingTime() {
+  probability_.setConstant((1.0 - kNone) / (VelocityLag::kCount - 1));
+  probability_(0) = kNone;
 }
 
 SmoothingTime::Expected SmoothingTime::expected(const VelocityLag& lag, const Eigen::Vector3d& acceleration) const {
@@ -32,34 +30,25 @@ SmoothingTime::Expected SmoothingTime::expected(const VelocityLag& lag, const Ei
   return e;
 }
 
-SmoothingTime::Each SmoothingTime::latency() const {
-  return -by_latency_.array() / (information_.array() + latency_information_);
-}
-
 /// The innovation's variance holds the spread too: innovations that follow each other closely are correlated, and it
 /// keeps the first of them from deciding alone.
-double SmoothingTime::learn(const AidingRecord& velocity, const VelocityLag& lag, const Eigen::Vector3d& acceleration,
-                            double latency_now) {
-  const Expected e = expected(lag, acceleration);
+void SmoothingTime::learn(const AidingRecord& velocity, const VelocityLag& lag) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int k = 0; k < VelocityLag::kCount; ++k) mean += probability_(k) * lag.lag(k);
   const Eigen::Vector3d innovation = Eigen::Map<const Eigen::Vector3d>(velocity.innovation.data());
-  Eigen::Vector3d weight = Eigen::Map<const Eigen::Vector3d>(velocity.innovation_variance.data()).cwiseInverse();
-  // Up and down the road's unevenness shows a low pass best, but is over before a latency has passed.
-  if (latency_information_ < 1.0 / (kRoad * kRoad)) weight.z() = 0.0;
+  const Eigen::Vector3d variance = Eigen::Map<const Eigen::Vector3d>(velocity.innovation_variance.data());
+  Eigen::Matrix<double, VelocityLag::kCount, 1> square;
   for (int k = 0; k < VelocityLag::kCount; ++k) {
-    const Eigen::Vector3d a = lag.rate(k, acceleration);
-    const Eigen::Vector3d y = innovation + e.lag - lag.lag(k) - latency_now * e.rate;
-    square_(k) += y.cwiseProduct(weight).dot(y);
-    by_latency_(k) += a.cwiseProduct(weight).dot(y);
-    information_(k) += a.cwiseProduct(weight).dot(a);
+    const Eigen::Vector3d off = innovation + mean - lag.lag(k);
+    square(k) = (off.array().square() / variance.array()).sum();
   }
-  const Each own = latency(), before = probability_;
-  Each misfit = square_.array() + own.array() * by_latency_.array() +
-                (1.0 + information_.array() / latency_information_).log() - 2.0 * prior_.array().log();
-  const double least = misfit.minCoeff();
-  for (int k = 0; k < VelocityLag::kCount; ++k) square_(k) -= std::max(0.0, misfit(k) - least - kMostEvidence);
-  probability_ = (-0.5 * (misfit.array() - least).min(kMostEvidence)).exp();
-  probability_ /= probability_.sum();
-  return (probability_ - before).dot(own);
+  const double least = square.minCoeff();
+  double sum = 0.0;
+  for (int k = 0; k < VelocityLag::kCount; ++k) {
+    probability_(k) = std::max(kLeast, probability_(k) * std::exp(-0.5 * (square(k) - least)));
+    sum += probability_(k);
+  }
+  probability_ /= sum;
 }
 
 }  // namespace roadfix::navigation
