@@ -111,9 +111,14 @@ def main():
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "random_cars", metavar="FOLDER", help="what is made (default: out/random_cars)")
     parser.add_argument("--jobs", type=int, metavar="N", help="drives at a time (default: one a core)")
     arguments = parser.parse_args()
+    if not ROADFIX.exists():
+        sys.exit(f"{ROADFIX} is missing: scripts/build release")
     arguments.out.mkdir(parents=True, exist_ok=True)
     run(arguments.out, range(arguments.first, arguments.first + arguments.cars), arguments.jobs)
-    report(results(arguments.out))
+    found = results(arguments.out)
+    if not found:
+        sys.exit("no car has a pose")
+    report(found)
 
 
 if __name__ == "__main__":

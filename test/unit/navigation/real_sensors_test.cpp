@@ -37,6 +37,7 @@ ScenarioConfig phone_in_city() {
   return s;
 }
 
+/// The antenna's place is told in the imu's own axes, however the imu is turned.
 NavigationConfig phone_config(const SimulatedDrive& drive) {
   NavigationConfig config = filter_config(drive.config);
   config.facts.p_imu_antenna = drive.errors.q_vehicle_imu.conjugate() * config.facts.p_imu_antenna;
