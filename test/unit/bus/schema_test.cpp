@@ -42,9 +42,10 @@ std::map<std::string, int64_t> generated_fingerprints() {
 }
 
 std::map<std::string, int64_t> all_generated() {
-  return generated_fingerprints<aiding_t, config_t, fusion_state_t, gnss_t, health_t, protection_level_t, heartbeat_t, horizon_t, image_t,
-                                imu_t, ins_status_t, ledger_entry_t, ledger_t, mag_t, pose_t, provenance_t, raw_t,
-                                fusion_state2_t, state_t, vo_features2_t, vo_features_t, vo_restart_t, vo_status_t, wheels_t>();
+  return generated_fingerprints<aiding_t, config_t, fusion_state_t, gnss_t, health_t, protection_level_t, heartbeat_t,
+                                horizon_t, image_t, imu_t, ins_status_t, ledger_entry_t, ledger_t, mag_t, pose_t,
+                                provenance_t, raw_t, fusion_state2_t, state_t, vo_features2_t, vo_features_t,
+                                vo_restart_t, vo_status_t, wheels_t>();
 }
 
 ledger_t some_ledger() {

@@ -44,7 +44,8 @@ RateStatistics drive(double rate_hz, double resolution_mps) {
   std::printf(
       "wheels at %.0f Hz in steps of %.2f m/s: up to %.1f m/s2 between two; %.2f %% coasting, tilt beyond 3 sigma %.2f "
       "%%\n",
-      rate_hz, resolution_mps, result.worst_rate, 100.0 * result.coasting / result.poses, 100.0 * result.beyond / result.poses);
+      rate_hz, resolution_mps, result.worst_rate, 100.0 * result.coasting / result.poses,
+      100.0 * result.beyond / result.poses);
   return result;
 }
 
@@ -55,7 +56,8 @@ TEST_CASE("high-rate and quantised wheel speeds cause neither slip nor tilt erro
     const RateStatistics result = drive(rate_hz, resolution_mps);
     CHECK(result.coasting < 0.01 * result.poses);
     CHECK(result.beyond < 0.08 * result.poses);
-    if (rate_hz > 20.0) CHECK(result.worst_rate > 2.0 * WheelTuning{}.tilt_gate);  // single differences would be rejected
+    if (rate_hz > 20.0)
+      CHECK(result.worst_rate > 2.0 * WheelTuning{}.tilt_gate);  // single differences would be rejected
   }
 }
 
