@@ -49,6 +49,16 @@ class Check(unittest.TestCase):
         self.assertEqual(check.changed(), ["scene", "wheel"])
 
 
+class Help(unittest.TestCase):
+    def test_every_script_says_what_it_does_and_does_nothing_else(self):
+        for script in sorted((ROOT / "scripts").iterdir()):
+            if script.is_file() and os.access(script, os.X_OK):
+                with self.subTest(script=script.name):
+                    done = subprocess.run([str(script), "--help"], capture_output=True, text=True, cwd=ROOT, timeout=60)
+                    self.assertEqual(done.returncode, 0)
+                    self.assertIn(f"scripts/{script.name}", done.stdout)
+
+
 class Build(unittest.TestCase):
     def build(self, output, status):
         """scripts/build in a folder of its own, with a cmake that prints `output`."""
