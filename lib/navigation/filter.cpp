@@ -152,7 +152,9 @@ Eigen::Matrix<double, Rows, 1> Filter::residual(const Measurement<Rows>& m) cons
 template <int Rows>
 void Filter::reject(const Measurement<Rows>& m) {
   const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
-  if (innovation.usable) steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened);
+  if (!innovation.usable) return;
+  steps_.begin_at_surprise(state_, motion(), innovation.nis, Rows);
+  steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened);
 }
 
 template <int Rows>
@@ -197,6 +199,7 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
   state_.subtract(Y);
   state_.P()(kept, kept) = cov;
   for (const int i : kept) Y.row(i).setZero();
+  if (evidence) steps_.begin_at_surprise(state_, motion(), innovation.nis, Rows);
   steps_.use<Rows>(state_, m.H, innovation.L, innovation.whitened, Y, evidence);
   scratch_.head(n) = Y.lazyProduct(innovation.whitened);
   state_.correct(scratch_);

@@ -7,12 +7,14 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr int64_t kApart_us = 1'000'000;  // between two moments
-constexpr double kMostOfIt = 0.5;         // of what the innovations have too much, at least, is the step's
-constexpr double kLeastEvidence = 3.0;    // measurements; fewer are outliers
-constexpr double kMemory = 16.0;          // s, as far back as a step is looked for
-constexpr double kStartMemory = 120.0;    // s, of the evidence on what was wrong from the start
-constexpr double kBeyondOthers = 3.0;     // by which the logarithm of the odds exceeds that of every other kind
+constexpr int kApart_us = 500'000;      // between two moments
+constexpr int kFirst_us = 1'000'000;    // between two of the first octave
+constexpr double kMoreOf = 2.0;         // of two surprises within a second, that the second is another
+constexpr double kMostOfIt = 0.5;       // of what the innovations have too much, at least, is the step's
+constexpr double kLeastEvidence = 3.0;  // measurements; fewer are outliers
+constexpr double kMemory = 16.0;        // s, as far back as a step is looked for
+constexpr double kStartMemory = 120.0;  // s, of the evidence on what was wrong from the start
+constexpr double kBeyondOthers = 3.0;   // by which the logarithm of the odds exceeds that of every other kind
 
 struct Block {
   StepKind kind;
@@ -103,15 +105,33 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
   age_(moment) = squares_(moment) = count_(moment) = 0.0;
 }
 
-/// Two moments per octave: of one second the first two take turns, of two seconds the next two, ...
+void StepDetector::begin_latest(State& state, const BodyMotion& motion) {
+  latest_ = 1 - latest_;
+  latest_us_ = state.x.t_us;
+  begin(state, motion, latest_);
+}
+
+void StepDetector::begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows) {
+  const int64_t t_us = state.x.t_us;
+  if (!watches_ || whitened_square < kMostSquare + rows) return;
+  if (t_us < surprised_us_ + kFirst_us && whitened_square < kMoreOf * surprise_) return;
+  surprised_us_ = t_us;
+  surprise_ = whitened_square;
+  begin_latest(state, motion);
+}
+
+/// Two moments per octave: the first two take turns every second, the next two every two seconds, ... The others take
+/// turns every time.
 void StepDetector::advance(State& state, const BodyMotion& motion, bool displaced) {
   const int64_t t_us = state.x.t_us;
   if (!watches_ || t_us < next_us_) return;
   if (displaced) begin(state, motion, kStart);
   next_us_ = t_us + kApart_us;
   ++turn_;
-  for (int octave = 0; octave < kMoments / 2; ++octave) {
-    const int period = 1 << octave;
+  begin(state, motion, kOctaves + turn_ % (kMoments - kOctaves));
+  if (t_us >= latest_us_ + kFirst_us) begin_latest(state, motion);
+  for (int octave = 1; octave < kOctaves / 2; ++octave) {
+    const int period = kFirst_us / kApart_us << octave;
     if (turn_ % period != 0) break;
     begin(state, motion, 2 * octave + (turn_ / period) % 2);
   }

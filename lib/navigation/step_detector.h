@@ -28,9 +28,12 @@ enum class StepKind {
 
 class StepDetector {
  public:
-  static constexpr int kMoments = 8;
-  /// Of these moments all kinds are carried that jump, of the older ones the wheels' scale alone.
-  static constexpr int kRecent = 4;
+  /// Moments two per octave of the past: of the recent ones all kinds are carried that jump, of the others the wheels'
+  /// scale alone.
+  static constexpr int kRecent = 4, kOctaves = 8;
+  /// Of the last eight seconds one moment every half second, with the wheels' scale alone: in a second the filter takes
+  /// most of its step for the car's speed.
+  static constexpr int kMoments = kOctaves + 16;
   /// The moment from which on the filter watches: the antenna's place, which was wrong from the start if it is.
   static constexpr int kStart = kMoments;
   static constexpr int kAntennaSize = 3;
@@ -58,9 +61,13 @@ class StepDetector {
   void begin(State& state, const BodyMotion& motion);
   void stop() { watches_ = false; }
   [[nodiscard]] bool watches() const { return watches_; }
-  /// Often: the oldest of the recent moments are replaced by now. `displaced`: the receiver is known to be, and what it says
+  /// Often: the oldest moments are replaced by now. `displaced`: the receiver is known to be, and what it says
   /// tells nothing of where its antenna is.
   void advance(State& state, const BodyMotion& motion, bool displaced);
+
+  /// Before use() or reject() of an innovation of `rows` rows: where one surprises a moment begins, at most once a second but
+  /// for larger ones: by a moment half a second beside it a step is found late.
+  void begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows);
 
   /// The filter's covariance step over T s.
   void move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
@@ -97,7 +104,8 @@ class StepDetector {
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(watches_, fresh_, next_us_, turn_, usual_, age_, sum_, squares_, count_, clock_step_, clock_step_us_);
+    a(watches_, fresh_, next_us_, turn_, latest_, latest_us_, surprised_us_, surprise_, usual_, age_, sum_, squares_,
+      count_, clock_step_, clock_step_us_);
     for (auto& m : information_) a(m);
   }
 
@@ -115,6 +123,8 @@ class StepDetector {
     double log_odds = 0.0;
   };
   void begin(State& state, const BodyMotion& motion, int moment);
+  /// The older of the first two moments.
+  void begin_latest(State& state, const BodyMotion& motion);
   void note_clock(const Step& step, int64_t t_us);
   [[nodiscard]] Fit best_of(int at, int size) const;
   [[nodiscard]] bool carries(int moment, int at, int size) const;
@@ -132,7 +142,9 @@ class StepDetector {
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
   bool watches_ = false, fresh_ = false;
   int64_t next_us_ = 0;
-  int turn_ = 0;
+  int turn_ = 0, latest_ = 0;  ///< latest_: of the first two moments
+  int64_t latest_us_ = 0, surprised_us_ = 0;
+  double surprise_ = 0.0;      ///< square of the whitened innovation at which a moment began last
   double clock_step_ = 0.0;    ///< s, of the receiver's clock, as of doubted()
   int64_t clock_step_us_ = 0;  ///< of the last of them; 0: none
   double usual_ = 1.0;         ///< mean normalised square: measurements may be noisier than they claim

@@ -114,7 +114,7 @@ TEST_CASE("a drag along the road is not taken for the receiver's clock for good"
   for (uint64_t seed = 1; seed <= 6; ++seed) {
     const Worst w = drive_with(kAlong, 150.0, seed, nullptr, true, "highway");
     CAPTURE(seed, w.beyond, w.last);
-    CHECK(w.beyond < 6.0);  // before the drag is found, and after it
+    CHECK(w.beyond < 7.0);  // before the drag is found, and after it
     CHECK(w.last < 0.2);
   }
   // Teeth: without the step detector it is followed.
@@ -187,11 +187,21 @@ TEST_CASE("wheels that slip by less than their gate do not lead away from fixed 
 }
 
 TEST_CASE("a receiver that repeats itself does not make wheels doubted") {
-  check_held(drive_with("gnss.stuck@60+20", 120.0, 1), 1.0, 0.05);
+  int believed = 0;
+  for (const char* fault : {"gnss.stuck@60+20", "gnss.stuck@60.4+20"})
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+      const Worst w = drive_with(fault, 120.0, seed);
+      CAPTURE(fault, seed);
+      check_held(w, 0.5, 0.4);
+      CHECK(w.beyond < 5.0);
+      believed += w.last < 0.05 ? 1 : 0;
+    }
+  CHECK(believed >= 7);  // where the way without it has led four sigma astray, it is taken for displaced
 }
 
 TEST_CASE("a clock that is set by 50 ms is found out, whose ever it is") {
-  for (const char* fault : {"imu.clock@60", "imu.clock@60:offset_s=-0.05", "gnss.clock@60", "wheels.clock@60"}) {
+  for (const char* fault : {"imu.clock@60", "imu.clock@60:offset_s=-0.05", "gnss.clock@60", "gnss.clock@60.3",
+                            "gnss.clock@60.7", "wheels.clock@60", "wheels.clock@60.7"}) {
     for (uint64_t seed = 1; seed <= 2; ++seed) {
       const Worst w = drive_with(fault, 110.0, seed);
       CAPTURE(fault, seed);

@@ -37,8 +37,11 @@ Told in_tunnel(const char* fault, bool steps) {
 
 TEST_CASE("wheels whose scale steps before a tunnel or in it are found out without GNSS") {
   const Told none = in_tunnel(nullptr, true);
-  for (const char* fault : {"wheels.scale@85+200:ratio=0.02", "wheels.scale@110+200:ratio=0.02",
-                            "wheels.scale@85+200:ratio=0.005", "wheels.scale@110+200:ratio=-0.005"}) {
+  // At any phase of the moments that the filter compares with each other.
+  for (const char* fault :
+       {"wheels.scale@85+200:ratio=0.02", "wheels.scale@110.4+200:ratio=0.02", "wheels.scale@85+200:ratio=0.005",
+        "wheels.scale@85.25+200:ratio=0.005", "wheels.scale@85.5+200:ratio=0.005", "wheels.scale@85.75+200:ratio=0.005",
+        "wheels.scale@110+200:ratio=-0.005", "wheels.scale@110.5+200:ratio=-0.005"}) {
     const Told told = in_tunnel(fault, true), believed = in_tunnel(fault, false);
     std::printf("%s: %.2f m, square over variance %.2f; believed %.2f m, %.1f; without a step %.2f m, %.2f\n", fault,
                 told.error, told.honest, believed.error, believed.honest, none.error, none.honest);
