@@ -154,7 +154,7 @@ void Filter::reject(const Measurement<Rows>& m) {
   const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
   if (!innovation.usable) return;
   steps_.begin_at_surprise(state_, motion(), innovation.nis, Rows);
-  steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened);
+  steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened, m.shows_antenna);
 }
 
 template <int Rows>
@@ -200,7 +200,7 @@ void Filter::apply(const Measurement<Rows>& m, bool evidence) {
   state_.P()(kept, kept) = cov;
   for (const int i : kept) Y.row(i).setZero();
   if (evidence) steps_.begin_at_surprise(state_, motion(), innovation.nis, Rows);
-  steps_.use<Rows>(state_, m.H, innovation.L, innovation.whitened, Y, evidence);
+  steps_.use<Rows>(state_, m.H, innovation.L, innovation.whitened, Y, evidence, m.shows_antenna);
   scratch_.head(n) = Y.lazyProduct(innovation.whitened);
   state_.correct(scratch_);
 }

@@ -24,6 +24,7 @@ struct Measurement {
   double repeated =
       0.0;  ///< added to R's diagonal in the update alone: errors that the next ones repeat (Bartlett 1946)
   Considered considered;
+  bool shows_antenna = true;  ///< it is evidence of the antenna's place
 };
 
 enum class AidingSource {

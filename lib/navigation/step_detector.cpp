@@ -168,12 +168,12 @@ StepDetector::Rows StepDetector::explained(const State& state, const Eigen::Ref<
   return G;
 }
 
-void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G,
-                         const Eigen::Ref<const Eigen::VectorXd>& whitened) {
+void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen::Ref<const Eigen::VectorXd>& whitened,
+                         bool antenna) {
   // Robust weight, as of Huber's estimator: single outliers decide nothing, those that agree with each other do.
   const double square = whitened.squaredNorm(), rows = static_cast<double>(whitened.size());
   const double weight = std::min(1.0, kMostSquare * rows / square);
-  for (int m = 0; m <= kMoments; ++m) {
+  for (int m = 0; m <= (antenna ? kStart : kStart - 1); ++m) {
     const int n = width(m);
     const auto g = G.middleCols(first(m), n);
     information_[static_cast<size_t>(m)].topLeftCorner(n, n) += weight * g.transpose().lazyProduct(g);

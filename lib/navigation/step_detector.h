@@ -72,23 +72,25 @@ class StepDetector {
   /// The filter's covariance step over T s.
   void move(State& state, const Eigen::Matrix<double, 9, kInertialSize>& F,
             const Eigen::Matrix<double, kWithoutCamera, 1>& decay, double T);
-  /// The filter's update: `whitened` innovation u = L^-1 r, Y = P H' L^-T; `counts`: it is evidence.
+  /// The filter's update: `whitened` innovation u = L^-1 r, Y = P H' L^-T; `counts`: it is evidence; `antenna`: of the
+  /// antenna's place too.
   template <int Rows>
   void use(State& state, const Eigen::Matrix<double, Rows, kWithoutCamera>& H,
            const Eigen::Matrix<double, Rows, Rows>& L, const Eigen::Matrix<double, Rows, 1>& whitened,
-           const Eigen::Ref<const Eigen::MatrixXd>& Y, bool counts) {
+           const Eigen::Ref<const Eigen::MatrixXd>& Y, bool counts, bool antenna) {
     if (!watches_) return;
     auto G = explained(state, H, L);
     state.carried().topRows(state.size()).noalias() -= Y.lazyProduct(G);
     if (!counts) return;
     usual_ += kUsualGain * (std::min(whitened.squaredNorm() / Rows, kMostSquare) - usual_);
-    weigh(G, whitened);
+    weigh(G, whitened, antenna);
   }
   /// A measurement that the filter rejected.
   template <int Rows>
   void reject(const State& state, const Eigen::Matrix<double, Rows, kWithoutCamera>& H,
-              const Eigen::Matrix<double, Rows, Rows>& L, const Eigen::Matrix<double, Rows, 1>& whitened) {
-    if (watches_) weigh(explained(state, H, L), whitened);
+              const Eigen::Matrix<double, Rows, Rows>& L, const Eigen::Matrix<double, Rows, 1>& whitened,
+              bool antenna) {
+    if (watches_) weigh(explained(state, H, L), whitened, antenna);
   }
 
   /// The step that explains most, unless chance does at this many sigmas, something else makes the innovations large, or
@@ -117,7 +119,8 @@ class StepDetector {
   using Rows = Eigen::Block<Eigen::MatrixXd>;
   Rows explained(const State& state, const Eigen::Ref<const Eigen::MatrixXd>& H,
                  const Eigen::Ref<const Eigen::MatrixXd>& L);
-  void weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen::Ref<const Eigen::VectorXd>& whitened);
+  void weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen::Ref<const Eigen::VectorXd>& whitened,
+             bool antenna);
   struct Fit {
     int moment = 0;
     double log_odds = 0.0;

@@ -2,6 +2,7 @@
 // innovations show.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <deque>
 #include <random>
 
 #include "navigation/aiding/gnss_velocity/smoothing_time.h"
@@ -17,32 +18,54 @@ Eigen::Vector3d acceleration_at(double t, double most) {
   return most * std::sin(0.5 * t) * Eigen::Vector3d(0.8, 0.6, 0.0);
 }
 
-/// What `duration` s of velocities through a low pass of `tau` s, claimed right, leave to be believed of each time
-/// constant.
-SmoothingTime learnt(double tau, double most, double duration, unsigned seed) {
+/// A receiver, and what is known of its latency: s, and the sigma of that of `latency`.
+struct Receiver {
+  double tau = 0.0, latency = 0.0, latency_std = 0.0;
+};
+
+/// What `duration` s of velocities of this receiver, claimed right, leave to be believed of each time constant. The latency is
+/// estimated by a scalar Kalman filter beside it, as the navigation filter does; its last value goes to `latency`.
+SmoothingTime learnt(const Receiver& receiver, double most, double duration, unsigned seed, double* latency = nullptr) {
   std::mt19937 rng(seed);
   std::normal_distribution<double> n(0.0, kSigma);
-  SmoothingTime time;
+  SmoothingTime time(receiver.latency_std);
+  double late = 0.0, late_variance = receiver.latency_std * receiver.latency_std;
+  std::deque<Eigen::Vector3d> told;
   VelocityLag lag;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), filtered = Eigen::Vector3d::Zero();
   const int fix = static_cast<int>(kFix / kImu);
   for (int i = 1; i * kImu < duration; ++i) {
     const Eigen::Vector3d before = velocity;
     velocity += kImu * acceleration_at(i * kImu, most);
-    filtered = tau == 0.0 ? velocity : Eigen::Vector3d(velocity + std::exp(-kImu / tau) * (filtered - velocity));
+    filtered = receiver.tau == 0.0 ? velocity
+                                   : Eigen::Vector3d(velocity + std::exp(-kImu / receiver.tau) * (filtered - velocity));
+    told.push_back(filtered);
+    if (static_cast<double>(told.size()) * kImu > receiver.latency + 1.5 * kImu) told.pop_front();
     lag.advance(velocity - before, kImu);
     if (i % fix != 0) continue;
-    const SmoothingTime::Expected e = time.expected(lag, acceleration_at(i * kImu, most));
-    const Eigen::Vector3d innovation = filtered + Eigen::Vector3d(n(rng), n(rng), n(rng)) - (velocity + e.lag);
-    const Eigen::Vector3d variance = e.spread.diagonal().array() + kSigma * kSigma;
+    const Eigen::Vector3d a = acceleration_at(i * kImu, most);
+    const SmoothingTime::Expected e = time.expected(lag, a, Eigen::Vector3d::Zero());
+    const Eigen::Vector3d innovation =
+        told.front() + Eigen::Vector3d(n(rng), n(rng), n(rng)) - (velocity + e.lag - late * e.rate);
+    const Eigen::Vector3d variance =
+        e.spread.diagonal().array() + kSigma * kSigma + late_variance * e.rate.array().square();
     AidingRecord r;
     r.dof = 3;
     for (int k = 0; k < 3; ++k) {
       r.innovation[static_cast<size_t>(k)] = innovation(k);
       r.innovation_variance[static_cast<size_t>(k)] = variance(k);
     }
-    time.learn(r, lag);
+    const double late_before = late, speed = e.rate.norm();
+    if (speed > 1e-6) {
+      const Eigen::Vector3d along = e.rate / speed;
+      const double S = along.dot((variance.asDiagonal() * along).eval());
+      const double gain = -late_variance * speed / S;
+      late += gain * along.dot(innovation);
+      late_variance *= 1.0 + gain * speed;
+    }
+    late += time.learn(r, lag, a, Eigen::Vector3d::Zero(), late_before);
   }
+  if (latency != nullptr) *latency = late;
   return time;
 }
 
@@ -66,17 +89,33 @@ TEST_CASE("accelerations show the receiver's time constant, or that it has none"
   for (int k = 0; k < VelocityLag::kCount; ++k)
     for (unsigned seed = 1; seed <= 5; ++seed) {
       CAPTURE(k, seed);
-      CHECK(learnt(VelocityLag::time(k), 2.0, 30.0, seed).probability(k) > 0.99);
+      CHECK(learnt({VelocityLag::time(k)}, 2.0, 30.0, seed).probability(k) > 0.99);
     }
 }
 
 TEST_CASE("a time constant in between goes to its neighbours") {
-  const SmoothingTime t = learnt(0.35, 2.0, 30.0, 1);
+  const SmoothingTime t = learnt({0.35}, 2.0, 30.0, 1);
   CHECK(t.probability(2) + t.probability(3) > 0.99);
   CHECK(t.probability(0) < 0.01);
 }
 
 TEST_CASE("a steady speed shows nothing") {
-  const SmoothingTime before, t = learnt(1.0, 0.0, 30.0, 1);
+  const SmoothingTime before(0.0), t = learnt({1.0}, 0.0, 30.0, 1);
   for (int k = 0; k < VelocityLag::kCount; ++k) CHECK(std::abs(t.probability(k) - before.probability(k)) < 1e-12);
+}
+
+TEST_CASE("a receiver that is late is taken for one, and a low pass is not its opposite") {
+  for (const double tau : {0.0, 0.5})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      CAPTURE(tau, seed);
+      double latency = 0.0;
+      const SmoothingTime t = learnt({tau, 0.3, 0.3}, 2.0, 120.0, seed, &latency);
+      double all = latency;
+      for (int k = 0; k < VelocityLag::kCount; ++k) all += t.probability(k) * VelocityLag::time(k);
+      CHECK(std::abs(all - tau - 0.3) < 0.05);  // what slow accelerations tell is the sum
+      CHECK(std::abs(latency - 0.3) < 0.15);
+      CHECK(t.probability(VelocityLag::kCount - 1) < 0.01);
+    }
+  // Taken for one that is never late, it has a low pass.
+  CHECK(learnt({0.0, 0.3, 0.0}, 2.0, 120.0, 1).probability(0) < 0.01);
 }

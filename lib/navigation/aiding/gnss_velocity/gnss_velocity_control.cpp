@@ -15,16 +15,22 @@ constexpr double kOutage = 3.0;       // s without a velocity, over which nothin
 constexpr double kTiltTime = 10.0;    // s, for which tilt and biases of an aided filter are off by the same
 constexpr double kLeastDrift = 0.01;  // m/s/sqrt(s), of a velocity that the imu carries
 
-/// m2/s3, level: by how much the propagated velocity may drift, as a random walk.
-Eigen::Vector2d drift_rate(Filter& filter) {
+/// (m/s2)^2, level, of what the imu says by tilt and accelerometer biases.
+Eigen::Vector3d acceleration_variance(const Filter& filter) {
   const State& s = filter.state();
-  const Eigen::Vector3d force = filter.motion().acceleration - filter.earth().gravity(s.x.nav.position);
-  Eigen::Matrix<double, 2, 6> H;  // of the acceleration by attitude and accelerometer bias
-  H << -skew(force).topRows<2>(), -s.x.R().topRows<2>();
+  const Eigen::Vector3d force =
+      filter.motion().acceleration - inertial::Earth(filter.earth()).gravity(s.x.nav.position);
+  Eigen::Matrix<double, 3, 6> H;  // of the acceleration by attitude and accelerometer bias
+  H << -skew(force), -s.x.R();
   Eigen::Matrix<double, 6, 6> P;
   P << s.P().block<3, 3>(kAtt, kAtt), s.P().block<3, 3>(kAtt, kAccelBias), s.P().block<3, 3>(kAccelBias, kAtt),
       s.P().block<3, 3>(kAccelBias, kAccelBias);
-  return (2.0 * kTiltTime * (H * P * H.transpose()).diagonal().array() + kLeastDrift * kLeastDrift).matrix();
+  return (H * P * H.transpose()).diagonal();
+}
+
+/// m2/s3, level: by how much the propagated velocity may drift, as a random walk.
+Eigen::Vector2d drift_rate(const Filter& filter) {
+  return (2.0 * kTiltTime * acceleration_variance(filter).head<2>().array() + kLeastDrift * kLeastDrift).matrix();
 }
 
 }  // namespace
@@ -35,9 +41,11 @@ LastingError GnssVelocityControl::lasting() const {
 }
 
 Measurement<3> GnssVelocityControl::measurement(const Filter& filter, const Queued& velocity, double white) const {
-  const SmoothingTime::Expected smoothed = smoothing_.expected(filter.motion().lag, filter.motion().acceleration);
+  const SmoothingTime::Expected smoothed =
+      smoothing_.expected(filter.motion().lag, filter.motion().acceleration, acceleration_variance(filter));
   BodyMotion motion = filter.motion();
   motion.acceleration = smoothed.rate;
+  motion.acceleration.z() = 0.0;  // the road's unevenness, over before a latency has passed
   return gnss_velocity(filter.state(), motion, velocity.value - smoothed.lag, white * velocity.cov + smoothed.spread,
                        velocity.ahead(filter.state().x));
 }
@@ -51,7 +59,8 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
   const double factor = scale_.variance_factor();
   const Eigen::Vector3d left = kSmoothing * filter.motion().acceleration;
   Measurement<3> m = measurement(filter, velocity, factor * (1.0 - like.share));
-  m.considered = {kAntenna, 3};  // a smoothed velocity looks like an antenna elsewhere
+  m.considered = {kAntenna, 3};  // a smoothed velocity looks like an antenna elsewhere,
+  m.shows_antenna = timed_;      // a late one no less
   const AidingRecord r = filter.fuse(AidingSource::kGnssVelocity, velocity.t_us, m, gate);
   if (r.status != AidingStatus::kAccepted || !lasting_) return r;
   filter.gnss_bias().velocity_time = 1.0 / like.rate;
@@ -61,12 +70,14 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
 
 AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {
   const Eigen::Vector2d before = off_way(filter, velocity);
+  const double latency = filter.state().x.velocity_latency;
+  const Eigen::Vector3d acceleration = filter.motion().acceleration, variance = acceleration_variance(filter);
   const AidingRecord r = fuse(filter, velocity, gates_.nis[3]);
   rejected_ = r.status == AidingStatus::kGated ? rejected_ + 1 : 0;
   if (r.status == AidingStatus::kAccepted || rejected_ >= kPersistent) scale_.learn(r);
   if (r.status != AidingStatus::kAccepted) return r;
   if (lasting_ && has_imu_) watch(filter, velocity, before);
-  smoothing_.learn(r, filter.motion().lag);
+  filter.state().x.velocity_latency += smoothing_.learn(r, filter.motion().lag, acceleration, variance, latency);
   return r;
 }
 

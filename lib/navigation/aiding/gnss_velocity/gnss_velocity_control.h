@@ -12,8 +12,14 @@ namespace roadfix::navigation {
 
 class GnssVelocityControl {
  public:
+  static constexpr double kTimed = 0.01;  ///< s, sigma of a latency that is as good as known
+
   explicit GnssVelocityControl(const NavigationConfig& config)
-      : has_imu_(config.facts.has_imu), lasting_(config.aiding.lasting_errors), gates_(config.aiding.gate_sigma) {}
+      : has_imu_(config.facts.has_imu),
+        lasting_(config.aiding.lasting_errors),
+        timed_(ClockPriors(config.facts).velocity_latency < kTimed),
+        gates_(config.aiding.gate_sigma),
+        smoothing_(ClockPriors(config.facts).velocity_latency) {}
 
   AidingRecord use(Filter& filter, const Queued& velocity);
   AidingRecord try_on(Filter& filter, const Queued& velocity) const;
@@ -38,7 +44,7 @@ class GnssVelocityControl {
   AidingRecord fuse(Filter& filter, const Queued& velocity, double gate) const;
   void watch(Filter& filter, const Queued& velocity, const Eigen::Vector2d& before);
 
-  bool has_imu_, lasting_;
+  bool has_imu_, lasting_, timed_;
   Gates gates_;
   NoiseScale scale_;
   SmoothingTime smoothing_;
