@@ -5,13 +5,16 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr double kWheelPeriodSlack = 0.005;  // s
+constexpr double kMoving = 0.5;              // m/s, at which no two places are the same
 
 }  // namespace
 
-AidingStatus MeasurementInput::screen(const GnssFix& fix) {
-  const bool again = fix.t_us == last_fix_us_ && fix.antenna.latitude == last_fix_.latitude &&
-                     fix.antenna.longitude == last_fix_.longitude && fix.antenna.height == last_fix_.height;
-  return again ? AidingStatus::kBadInput : screen_.check(fix);
+AidingStatus MeasurementInput::screen(const GnssFix& fix, double speed) {
+  const bool same_place = fix.antenna.latitude == last_fix_.latitude && fix.antenna.longitude == last_fix_.longitude &&
+                          fix.antenna.height == last_fix_.height;
+  if (same_place && fix.t_us == last_fix_us_) return AidingStatus::kBadInput;
+  const bool moving = speed > kMoving || (fix.velocity && fix.velocity->enu.norm() > kMoving);
+  return same_place && moving ? screen_.repeated() : screen_.check(fix);
 }
 
 void MeasurementInput::add(const GnssFix& fix, int64_t id, const Geodetic& anchor) {

@@ -12,8 +12,9 @@ class MeasurementInput {
  public:
   explicit MeasurementInput(const NavigationConfig& config) : config_(config), screen_(config.screen) {}
 
-  /// By the receiver's own figures; one that was added already is bad input.
-  AidingStatus screen(const GnssFix& fix);
+  /// By the receiver's own figures. One that was added already is bad input, and so is the same place to the last bit of a
+  /// car that moves: at `speed` (m/s, 0 where nobody but the receiver tells) or by the fix's own velocity.
+  AidingStatus screen(const GnssFix& fix, double speed);
   /// A fix that passed, in the enu frame of `anchor`.
   void add(const GnssFix& fix, int64_t id, const Geodetic& anchor);
   /// Every sample of the wheels, before it is added.

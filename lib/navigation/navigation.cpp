@@ -77,7 +77,8 @@ void Navigation::add(const GnssFix& fix, int64_t id) {
 }
 
 void Navigation::take(const GnssFix& fix, int64_t id) {
-  AidingStatus status = measurements_.screen(fix);
+  const bool others_tell = filter() && start_.usable() && (has_imu() || motion_.car().driven_by_wheels());
+  AidingStatus status = measurements_.screen(fix, others_tell ? filter()->state().x.nav.velocity.norm() : 0.0);
   if (!config_.sources.any_gnss()) status = AidingStatus::kDisabled;
   if (status != AidingStatus::kAccepted) return log_.add(record_of(AidingSource::kGnssPosition, status, fix.t_us), id);
   if (frame_.local() && start_.gives_way_to_fixes(filter(), fix.t_us)) begin_again();

@@ -26,6 +26,7 @@ enum Reason {
   kFewSatellites,
   kPoorGeometry,
   kOldCorrections,
+  kRepeats,
   kReasons
 };
 constexpr std::array<const char*, kReasons> kWords = {"no fix yet",
@@ -43,7 +44,8 @@ constexpr std::array<const char*, kReasons> kWords = {"no fix yet",
                                                       "claimed sigma too large",
                                                       "too few satellites",
                                                       "dilution of precision too large",
-                                                      "corrections too old"};
+                                                      "corrections too old",
+                                                      "it repeats one place, and the car moves"};
 
 constexpr double kNullIsland = 1e-9;  // rad: receivers without a fix report 0, 0
 
@@ -73,6 +75,11 @@ Reason poor(const GnssFix& f, const GnssScreenConfig& c, double slack) {
 }  // namespace
 
 const char* GnssScreen::reason() const { return kWords[static_cast<size_t>(reason_)]; }
+
+AidingStatus GnssScreen::repeated() {
+  reason_ = kRepeats;
+  return AidingStatus::kBadInput;
+}
 
 AidingStatus GnssScreen::check(const GnssFix& fix) {
   if (const Reason reason = malformed(fix); reason != kFine) {

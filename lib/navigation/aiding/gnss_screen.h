@@ -17,6 +17,8 @@ class GnssScreen {
   explicit GnssScreen(const GnssScreenConfig& config) : config_(config) {}
 
   AidingStatus check(const GnssFix& fix);
+  /// A fix at the place of the one before while the car moves.
+  AidingStatus repeated();
   [[nodiscard]] GnssQuality quality() const { return quality_; }
   [[nodiscard]] const char* reason() const;  ///< plain words; empty while good
   /// s between good fixes: the smaller one of the last two intervals, so that an outage is none of the receiver's.
