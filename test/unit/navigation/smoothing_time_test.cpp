@@ -1,5 +1,6 @@
 // The low pass of a receiver's velocities: the lag against a filter made in small steps, and the time constant that the
 // innovations show.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <deque>
@@ -21,6 +22,8 @@ Eigen::Vector3d acceleration_at(double t, double most) {
 /// A receiver, and what is known of its latency: s, and the sigma of that of `latency`.
 struct Receiver {
   double tau = 0.0, latency = 0.0, latency_std = 0.0;
+  double step = 0.0;   ///< s, of its clock in the middle of the drive; the latency that is estimated steps too
+  bool found = false;  ///< that step, in its positions
 };
 
 /// What `duration` s of velocities of this receiver, claimed right, leave to be believed of each time constant. The latency is
@@ -31,6 +34,7 @@ SmoothingTime learnt(const Receiver& receiver, double most, double duration, uns
   SmoothingTime time(receiver.latency_std);
   double late = 0.0, late_variance = receiver.latency_std * receiver.latency_std;
   std::deque<Eigen::Vector3d> told;
+  double latency_now = receiver.latency, clock = 0.0;
   VelocityLag lag;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero(), filtered = Eigen::Vector3d::Zero();
   const int fix = static_cast<int>(kFix / kImu);
@@ -40,13 +44,19 @@ SmoothingTime learnt(const Receiver& receiver, double most, double duration, uns
     filtered = receiver.tau == 0.0 ? velocity
                                    : Eigen::Vector3d(velocity + std::exp(-kImu / receiver.tau) * (filtered - velocity));
     told.push_back(filtered);
-    if (static_cast<double>(told.size()) * kImu > receiver.latency + 1.5 * kImu) told.pop_front();
+    if (i == static_cast<int>(0.5 * duration / kImu)) {
+      latency_now += receiver.step;
+      late += receiver.step;
+      if (receiver.found) clock = receiver.step;
+    }
+    if (static_cast<double>(told.size()) * kImu > 1.0) told.pop_front();
     lag.advance(velocity - before, kImu);
     if (i % fix != 0) continue;
     const Eigen::Vector3d a = acceleration_at(i * kImu, most);
     const SmoothingTime::Expected e = time.expected(lag, a, Eigen::Vector3d::Zero());
+    const size_t ago = std::min(told.size() - 1, static_cast<size_t>(latency_now / kImu + 0.5));
     const Eigen::Vector3d innovation =
-        told.front() + Eigen::Vector3d(n(rng), n(rng), n(rng)) - (velocity + e.lag - late * e.rate);
+        told[told.size() - 1 - ago] + Eigen::Vector3d(n(rng), n(rng), n(rng)) - (velocity + e.lag - late * e.rate);
     const Eigen::Vector3d variance =
         e.spread.diagonal().array() + kSigma * kSigma + late_variance * e.rate.array().square();
     AidingRecord r;
@@ -63,7 +73,7 @@ SmoothingTime learnt(const Receiver& receiver, double most, double duration, uns
       late += gain * along.dot(innovation);
       late_variance *= 1.0 + gain * speed;
     }
-    late += time.learn(r, lag, a, Eigen::Vector3d::Zero(), late_before);
+    late += time.learn(r, lag, a, Eigen::Vector3d::Zero(), late_before - clock);
   }
   if (latency != nullptr) *latency = late;
   return time;
@@ -118,4 +128,17 @@ TEST_CASE("a receiver that is late is taken for one, and a low pass is not its o
     }
   // Taken for one that is never late, it has a low pass.
   CHECK(learnt({0.0, 0.3, 0.0}, 2.0, 120.0, 1).probability(0) < 0.01);
+}
+
+TEST_CASE("a clock that steps is no low pass, and leaves what was known of one") {
+  for (const int k : {0, 3})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      CAPTURE(k, seed);
+      double latency = 0.0;
+      const SmoothingTime t = learnt({VelocityLag::time(k), 0.0, 0.0, 0.1, true}, 2.0, 60.0, seed, &latency);
+      CHECK(t.probability(k) > 0.99);
+      CHECK(std::abs(latency - 0.1) < 0.02);
+    }
+  // Teeth: by evidence that takes the latency for what it was, a low pass.
+  CHECK(learnt({0.0, 0.0, 0.0, 0.1, false}, 2.0, 60.0, 1).probability(0) < 0.01);
 }

@@ -70,7 +70,8 @@ AidingRecord GnssVelocityControl::fuse(Filter& filter, const Queued& velocity, d
 
 AidingRecord GnssVelocityControl::use(Filter& filter, const Queued& velocity) {
   const Eigen::Vector2d before = off_way(filter, velocity);
-  const double latency = filter.state().x.velocity_latency;
+  // Beyond the position's: a receiver's clock that steps is no low pass.
+  const double latency = filter.state().x.velocity_latency - filter.state().x.position_latency;
   const Eigen::Vector3d acceleration = filter.motion().acceleration, variance = acceleration_variance(filter);
   const AidingRecord r = fuse(filter, velocity, gates_.nis[3]);
   rejected_ = r.status == AidingStatus::kGated ? rejected_ + 1 : 0;

@@ -23,8 +23,9 @@ class SmoothingTime {
   [[nodiscard]] Expected expected(const VelocityLag& lag, const Eigen::Vector3d& acceleration,
                                   const Eigen::Vector3d& acceleration_variance) const;
 
-  /// An accepted velocity whose innovation was found with expected(lag).lag taken out, at this latency (s). Returns by how
-  /// much the latency has to change for what is believed of the time constant now.
+  /// An accepted velocity whose innovation was found with expected(lag).lag taken out, at this latency (s, beyond that of
+  /// the receiver's positions, which its clock has too). Returns by how much the latency has to change for what is
+  /// believed of the time constant now.
   [[nodiscard]] double learn(const AidingRecord& velocity, const VelocityLag& lag, const Eigen::Vector3d& acceleration,
                              const Eigen::Vector3d& acceleration_variance, double latency);
   [[nodiscard]] double probability(int k) const { return probability_(k); }
