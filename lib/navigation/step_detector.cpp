@@ -23,21 +23,23 @@ struct Block {
   /// change or a clock is set once in seven, and an imu's bias, which temperature moves over minutes, hardly ever steps.
   /// One car in twenty has its antenna elsewhere.
   double rarity;
+  bool any_size = false;  ///< what comes from outside the car has no largest size
 };
 constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10, kImuClock = 13, kReceiverClock = 14,
               kWheelClock = 15;                      // columns
 constexpr int kAntennaPlace = StepDetector::kWidth;  // the columns of the start stand behind those of a moment here
 constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
-                                Block{StepKind::kImu, kBiases, 6, 7.0},
-                                Block{StepKind::kReceiver, kDisplacement, 6, 0.0},
-                                Block{StepKind::kReceiver, kDrag, 3, 0.0},  // from where it was: nothing jumps
+                                Block{StepKind::kImu, kBiases, 6, 7.0, true},
+                                Block{StepKind::kReceiver, kDisplacement, 6, 0.0, true},
+                                Block{StepKind::kReceiver, kDrag, 3, 0.0, true},  // from where it was: nothing jumps
                                 Block{StepKind::kImuClock, kImuClock, 1, 2.0},
-                                Block{StepKind::kReceiverClock, kReceiverClock, 1, 2.0},
+                                Block{StepKind::kReceiverClock, kReceiverClock, 1, 2.0, true},
                                 Block{StepKind::kWheelClock, kWheelClock, 1, 2.0},
                                 Block{StepKind::kLeverArm, kAntennaPlace, StepDetector::kAntennaSize, 3.0}};
 constexpr int column_of(int at) { return at < StepDetector::kWidth ? at : at - StepDetector::kWidth; }
 
-/// A step of normal prior given the evidence: mean, covariance, and the logarithm of the Bayes factor.
+/// A step given the evidence: mean, covariance, and the logarithm of the Bayes factor. Its prior is normal where it is not
+/// larger than steps are; where it is, they are larger than was assumed, which the odds pay for.
 struct Posterior {
   using Square = StepDetector::Small;
   using Vector = StepDetector::SmallVector;
@@ -45,12 +47,24 @@ struct Posterior {
   Vector mean;
   double explained = 0.0, log_odds = 0.0;
 
-  Posterior(const Square& information, const Vector& sum, const Vector& typical) {
-    Square A = typical.asDiagonal() * information * typical.asDiagonal();
+  Posterior(const Square& information, const Vector& sum, const Vector& typical, bool any_size) {
+    fit(information, sum, typical);
+    if (!any_size) return;
+    const Vector wide = typical.cwiseMax(mean.cwiseAbs());
+    if (wide == typical) return;
+    fit(information, sum, wide);
+    log_odds -= (wide.array() / typical.array().max(kExact)).log().sum();
+  }
+
+ private:
+  static constexpr double kExact = 1e-12;  // of a thing that does not step
+
+  void fit(const Square& information, const Vector& sum, const Vector& prior) {
+    Square A = prior.asDiagonal() * information * prior.asDiagonal();
     A.diagonal().array() += 1.0;
     const Eigen::LLT<Square> llt(A);
     const Square inverse = llt.solve(Square::Identity(sum.size(), sum.size()));
-    cov = typical.asDiagonal() * inverse * typical.asDiagonal();
+    cov = prior.asDiagonal() * inverse * prior.asDiagonal();
     mean = cov * sum;
     explained = mean.dot(sum);
     log_odds = 0.5 * explained - llt.matrixLLT().diagonal().array().log().sum();
@@ -105,22 +119,17 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
   age_(moment) = squares_(moment) = count_(moment) = 0.0;
 }
 
-void StepDetector::begin_latest(State& state, const BodyMotion& motion) {
-  latest_ = 1 - latest_;
-  latest_us_ = state.x.t_us;
-  begin(state, motion, latest_);
-}
-
 void StepDetector::begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows) {
   const int64_t t_us = state.x.t_us;
   if (!watches_ || whitened_square < kMostSquare + rows) return;
   if (t_us < surprised_us_ + kFirst_us && whitened_square < kMoreOf * surprise_) return;
   surprised_us_ = t_us;
   surprise_ = whitened_square;
-  begin_latest(state, motion);
+  latest_ = 1 - latest_;
+  begin(state, motion, kSurprises + latest_);
 }
 
-/// Two moments per octave: the first two take turns every second, the next two every two seconds, ... The others take
+/// Two moments per octave: the first two take turns every second, the next two every two seconds, ... The ring takes
 /// turns every time.
 void StepDetector::advance(State& state, const BodyMotion& motion, bool displaced) {
   const int64_t t_us = state.x.t_us;
@@ -128,12 +137,11 @@ void StepDetector::advance(State& state, const BodyMotion& motion, bool displace
   if (displaced) begin(state, motion, kStart);
   next_us_ = t_us + kApart_us;
   ++turn_;
-  begin(state, motion, kOctaves + turn_ % (kMoments - kOctaves));
-  if (t_us >= latest_us_ + kFirst_us) begin_latest(state, motion);
-  for (int octave = 1; octave < kOctaves / 2; ++octave) {
+  begin(state, motion, kRing + turn_ % (kMoments - kRing));
+  for (int octave = 0; octave < kOctaves; ++octave) {
     const int period = kFirst_us / kApart_us << octave;
     if (turn_ % period != 0) break;
-    begin(state, motion, 2 * octave + (turn_ / period) % 2);
+    begin(state, motion, of_octave(octave) + (turn_ / period) % 2);
   }
 }
 
@@ -188,17 +196,19 @@ bool StepDetector::carries(int moment, int at, int size) const {
   return at < kWidth ? moment < kStart && at + size <= width(moment) : moment == kStart;
 }
 
-StepDetector::Fit StepDetector::best_of(int at, int size) const {
+StepDetector::Fit StepDetector::best_of(size_t block) const {
+  const Block& b = kBlocks[block];
   const double usual = std::max(1.0, usual_);
-  const int column = column_of(at);
+  const int column = column_of(b.first);
   Fit best;
   for (int m = 0; m <= kMoments; ++m) {
-    if (count_(m) < kLeastEvidence || !carries(m, at, size)) continue;
-    const Posterior fit(information_[static_cast<size_t>(m)].block(column, column, size, size) / usual,
-                        sum_.col(m).segment(column, size) / usual, typical_.segment(at, size));
-    if (fit.explained * usual < kMostOfIt * squares_(m)) continue;
-    if (fit.log_odds > best.log_odds) best = {m, fit.log_odds};
+    if (count_(m) < kLeastEvidence || !carries(m, b.first, b.size)) continue;
+    const Posterior p(information_[static_cast<size_t>(m)].block(column, column, b.size, b.size) / usual,
+                      sum_.col(m).segment(column, b.size) / usual, typical_.segment(b.first, b.size), b.any_size);
+    if (p.explained * usual < kMostOfIt * squares_(m) || p.log_odds <= best.likelihood) continue;
+    best = {p.log_odds, {b.kind, p.log_odds - b.rarity, first(m) + column, p.mean, p.cov}};
   }
+  best.step.log_odds = best.likelihood - b.rarity;
   return best;
 }
 
@@ -208,32 +218,15 @@ std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool 
   size_t best = 0;
   for (size_t k = 0; k < kBlocks.size(); ++k) {
     if (displaced && (kBlocks[k].kind == StepKind::kReceiver || kBlocks[k].kind == StepKind::kLeverArm)) continue;
-    fits[k] = best_of(kBlocks[k].first, kBlocks[k].size);
-    fits[k].log_odds -= kBlocks[k].rarity;
-    if (fits[k].log_odds > fits[best].log_odds) best = k;
+    fits[k] = best_of(k);
+    if (fits[k].step.log_odds > fits[best].step.log_odds) best = k;
   }
-  if (fits[best].log_odds < 0.5 * sigmas * sigmas) return std::nullopt;
+  if (fits[best].step.log_odds < 0.5 * sigmas * sigmas) return std::nullopt;
   for (size_t k = 0; k < kBlocks.size(); ++k)
-    if (kBlocks[k].kind != kBlocks[best].kind && fits[best].log_odds < fits[k].log_odds + kBeyondOthers)
+    if (kBlocks[k].kind != kBlocks[best].kind && (fits[best].step.log_odds < fits[k].step.log_odds + kBeyondOthers ||
+                                                  fits[best].likelihood < fits[k].likelihood + kBeyondOthers))
       return std::nullopt;
-  const auto [kind, at, size, rarity] = kBlocks[best];
-  const int m = fits[best].moment;
-  const double usual = std::max(1.0, usual_);
-  const int column = column_of(at);
-  const Posterior fit(information_[static_cast<size_t>(m)].block(column, column, size, size) / usual,
-                      sum_.col(m).segment(column, size) / usual, typical_.segment(at, size));
-  return Step{kind, fit.log_odds - rarity, first(m) + column, fit.mean, fit.cov};
-}
-
-std::optional<StepDetector::Doubt> StepDetector::doubted(const Step& step, int64_t t_us) const {
-  if (step.kind != StepKind::kReceiver || !clock_stepped_lately(t_us)) return std::nullopt;
-  int oldest = 0;
-  age_.head<kRecent>().maxCoeff(&oldest);
-  return Doubt{first(oldest) + kReceiverClock, clock_step_};
-}
-
-bool StepDetector::clock_stepped_lately(int64_t t_us) const {
-  return clock_step_us_ != 0 && seconds_between(clock_step_us_, t_us) < kMemory;
+  return fits[best].step;
 }
 
 void StepDetector::take_back(const Step& step, State& state, const BodyMotion& motion) {
@@ -241,6 +234,7 @@ void StepDetector::take_back(const Step& step, State& state, const BodyMotion& m
   const auto per_unit = state.carried().middleCols(step.column, step.size.size()).topRows(n);
   ErrorVector d = per_unit * step.size;
   state.retract(d);
+  const ErrorVector made = d;
   const auto widen = [&] {
     for (int j = 0; j < n; ++j) state.P().col(j).head(n) += d(j) * d;
   };
@@ -249,20 +243,17 @@ void StepDetector::take_back(const Step& step, State& state, const BodyMotion& m
     d = per_unit * root.col(k);
     widen();
   }
-  if (const auto doubt = doubted(step, state.x.t_us)) {
-    d = doubt->size * state.carried().col(doubt->column).head(n);
+  auto last = state.carried().col(kLast);
+  const bool lately = last_us_ != 0 && seconds_between(last_us_, state.x.t_us) < kMemory;
+  if (lately && last_kind_ != step.kind) {
+    d = last.head(n);
     widen();
   }
-  note_clock(step, state.x.t_us);
+  if (!lately || last_kind_ != step.kind) last.setZero();
+  last.head(n) += made;
+  last_kind_ = step.kind;
+  last_us_ = step.kind == StepKind::kReceiver || step.kind == StepKind::kLeverArm ? 0 : state.x.t_us;
   begin(state, motion);
-}
-
-void StepDetector::note_clock(const Step& step, int64_t t_us) {
-  if (step.kind == StepKind::kReceiverClock) {
-    clock_step_ = (clock_stepped_lately(t_us) ? clock_step_ : 0.0) + step.size(0);
-    clock_step_us_ = t_us;
-  }
-  if (step.kind == StepKind::kReceiver) clock_step_us_ = 0;
 }
 
 }  // namespace roadfix::navigation

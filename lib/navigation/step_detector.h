@@ -28,18 +28,20 @@ enum class StepKind {
 
 class StepDetector {
  public:
-  /// Moments two per octave of the past: of the recent ones all kinds are carried that jump, of the others the wheels'
-  /// scale alone.
-  static constexpr int kRecent = 4, kOctaves = 8;
+  /// Moments two per octave of the past, 1 to 16 s, and two that began where an innovation surprised. Of the recent ones all
+  /// kinds are carried that jump, of the others the wheels' scale alone.
+  static constexpr int kOctaves = 4, kSurprises = 4, kRecent = kSurprises + 2;
+  static constexpr int of_octave(int octave) { return 2 * octave < kSurprises ? 2 * octave : 2 * octave + 2; }
   /// Of the last eight seconds one moment every half second, with the wheels' scale alone: in a second the filter takes
   /// most of its step for the car's speed.
-  static constexpr int kMoments = kOctaves + 16;
+  static constexpr int kRing = 2 * kOctaves + 2, kMoments = kRing + 16;
   /// The moment from which on the filter watches: the antenna's place, which was wrong from the start if it is.
   static constexpr int kStart = kMoments;
   static constexpr int kAntennaSize = 3;
   /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate, three clocks.
   static constexpr int kWidth = 16;
-  static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent + kAntennaSize;
+  static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent + kAntennaSize + 1;
+  static constexpr int kLast = kColumns - 1;  ///< what the step made that was taken back last
   static constexpr int width(int moment) { return moment < kRecent ? kWidth : moment < kStart ? 1 : kAntennaSize; }
   static constexpr int first(int moment) {
     return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
@@ -98,7 +100,7 @@ class StepDetector {
   /// its antenna is asked for no place.
   [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced) const;
   /// Takes `step` back: what it has made of all errors goes out of the means, how well it is known into the covariance, whose
-  /// epoch is the state's. Watches anew.
+  /// epoch is the state's; the one before is doubted where it was of another kind, (N.5.11). Watches anew.
   void take_back(const Step& step, State& state, const BodyMotion& motion);
 
   /// Evidence has come since the last call.
@@ -106,15 +108,20 @@ class StepDetector {
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(watches_, fresh_, next_us_, turn_, latest_, latest_us_, surprised_us_, surprise_, usual_, age_, sum_, squares_,
-      count_, clock_step_, clock_step_us_);
-    for (auto& m : information_) a(m);
+    a(watches_, fresh_, next_us_, turn_, latest_, surprised_us_, surprise_, usual_, age_, sum_, squares_, count_,
+      last_kind_, last_us_);
+    for (int m = 0; m <= kMoments; ++m) serialise(a, information_[static_cast<size_t>(m)], width(m));
   }
 
  private:
   static constexpr double kUsualGain = 0.01;  // ten seconds of wheel speeds
   static constexpr double kMostSquare = 9.0;  // one innovation counts at most as three sigma
   using Square = Eigen::Matrix<double, kWidth, kWidth>;
+  template <class Archive>
+  static void serialise(Archive& a, Square& information, int size) {
+    for (int k = 0; k < size; ++k)
+      for (int i = 0; i < size; ++i) a(information(i, k));
+  }
   /// What of a whitened innovation each step makes; in place, so that nothing of a fixed size is unrolled.
   using Rows = Eigen::Block<Eigen::MatrixXd>;
   Rows explained(const State& state, const Eigen::Ref<const Eigen::MatrixXd>& H,
@@ -122,35 +129,23 @@ class StepDetector {
   void weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen::Ref<const Eigen::VectorXd>& whitened,
              bool antenna);
   struct Fit {
-    int moment = 0;
-    double log_odds = 0.0;
+    double likelihood = 0.0;  ///< logarithm of its ratio to that of no step
+    Step step;                ///< of the moment that explains most
   };
   void begin(State& state, const BodyMotion& motion, int moment);
-  /// The older of the first two moments.
-  void begin_latest(State& state, const BodyMotion& motion);
-  void note_clock(const Step& step, int64_t t_us);
-  [[nodiscard]] Fit best_of(int at, int size) const;
+  [[nodiscard]] Fit best_of(size_t block) const;
   [[nodiscard]] bool carries(int moment, int at, int size) const;
-  [[nodiscard]] bool clock_stepped_lately(int64_t t_us) const;
-  /// (N.5.11): a receiver that is dragged off along the way looks like its clock at first. Where `step` shows it
-  /// displaced: the column of that clock, and the sum of its steps of the last 16 s, s.
-  struct Doubt {
-    int column = 0;
-    double size = 0.0;
-  };
-  [[nodiscard]] std::optional<Doubt> doubted(const Step& step, int64_t t_us) const;
-
   /// Standard deviations of steps, in the order of a moment's columns; then those of the antenna's place.
   Eigen::Matrix<double, kWidth + kAntennaSize, 1> typical_;
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
   bool watches_ = false, fresh_ = false;
   int64_t next_us_ = 0;
-  int turn_ = 0, latest_ = 0;  ///< latest_: of the first two moments
-  int64_t latest_us_ = 0, surprised_us_ = 0;
-  double surprise_ = 0.0;      ///< square of the whitened innovation at which a moment began last
-  double clock_step_ = 0.0;    ///< s, of the receiver's clock, as of doubted()
-  int64_t clock_step_us_ = 0;  ///< of the last of them; 0: none
-  double usual_ = 1.0;         ///< mean normalised square: measurements may be noisier than they claim
+  int turn_ = 0, latest_ = 0;  ///< latest_: of the two surprises
+  int64_t surprised_us_ = 0;
+  double surprise_ = 0.0;                   ///< square of the whitened innovation at which a moment began last
+  StepKind last_kind_ = StepKind::kWheels;  ///< of what was taken back last
+  int64_t last_us_ = 0;                     ///< when; 0: nothing, or nothing to doubt
+  double usual_ = 1.0;                      ///< mean normalised square: measurements may be noisier than they claim
   std::array<Square, kMoments + 1> information_ = [] {
     std::array<Square, kMoments + 1> zero;
     zero.fill(Square::Zero());

@@ -218,6 +218,27 @@ TEST_CASE("a place that is the same to the last bit tells nothing of a car that 
   CHECK(input.screen(fix, 2.0) == AidingStatus::kAccepted);
 }
 
+TEST_CASE("a receiver's clock that is off for two seconds is found out, and found to be right again") {
+  for (const char* fault : {"gnss.clock@25.5+2:offset_s=0.4", "gnss.clock@31+2:offset_s=0.4",
+                            "gnss.clock@31.5+2:offset_s=0.4", "gnss.clock@40.5+2:offset_s=-0.6"}) {
+    CAPTURE(fault);
+    check_held(drive_with(fault, 90.0, 5), 0.5, 0.05);
+  }
+  constexpr const char* kForGood = "gnss.clock@31:offset_s=0.4";
+  check_held(drive_with(kForGood, 110.0, 6), 0.1, 0.05);
+  CHECK(drive_with(kForGood, 110.0, 6, nullptr, false).horizontal > 1.0);  // teeth
+}
+
+TEST_CASE("a step that was taken for another's is doubted") {
+  // An accelerometer's bias looks like the wheels' scale at first.
+  for (const auto& [fault, seed] : {std::pair{"imu.bias@60:accel_x_mps2=0.2", uint64_t{3}},
+                                    {"imu.bias@61.4:accel_x_mps2=0.2", 2},
+                                    {"imu.bias@65.4:accel_x_mps2=0.2", 1}}) {
+    CAPTURE(fault, seed);
+    check_held(drive_with(fault, 110.0, seed, nullptr, true, "highway"), 0.3, 0.05);
+  }
+}
+
 TEST_CASE("a clock that is set by 50 ms is found out, whose ever it is") {
   for (const char* fault : {"imu.clock@60", "imu.clock@60:offset_s=-0.05", "gnss.clock@60", "gnss.clock@60.3",
                             "gnss.clock@60.7", "wheels.clock@60", "wheels.clock@60.7"}) {
