@@ -135,6 +135,7 @@ class StepDetector {
   void begin(State& state, const BodyMotion& motion, int moment);
   [[nodiscard]] Fit best_of(size_t block) const;
   [[nodiscard]] bool carries(int moment, int at, int size) const;
+
   /// Standard deviations of steps, in the order of a moment's columns; then those of the antenna's place.
   Eigen::Matrix<double, kWidth + kAntennaSize, 1> typical_;
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);

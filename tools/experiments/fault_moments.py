@@ -20,7 +20,7 @@ FAULTS = (
     "highway:wheels.slip@+40:ratio=0.02", "highway:imu.bias@:accel_x_mps2=0.2",
 )
 DURATION_S, SEEDS = 100, "1..3"
-MOMENTS = [40 + 0.7 * k for k in range(29)]  # s; no two at the same phase of a second
+MOMENTS = [40 + 0.7 * k for k in range(29)]  # s, at ten phases of a second
 
 
 def largest_errors(roadfix, fault, run, jobs):
