@@ -1,5 +1,6 @@
 #include "navigation/aiding/gnss_error_states.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace roadfix::navigation {
@@ -26,7 +27,7 @@ void reset_gnss_bias(Filter& filter, const Eigen::Vector3d& std) {
   state.x.gnss_bias.setZero();
 }
 
-void rescale_gnss_bias(Filter& filter, int at, double ratio) {
+void rescale_gnss_bias(Filter& filter, int at, double ratio, const Eigen::Vector3d& stationary) {
   filter.flush();
   State& state = filter.state();
   const Eigen::Vector3d& value = at == kGnssBias ? state.x.gnss_bias : state.x.gnss_velocity_bias;
@@ -36,7 +37,8 @@ void rescale_gnss_bias(Filter& filter, int at, double ratio) {
   for (int k = at; k < at + 3; ++k) {
     const double variance = P(k, k);
     if (!(variance > 0.0)) continue;
-    const double root = std::sqrt(std::abs(ratio - 1.0) / variance);
+    const double most = std::max(1.0, stationary(k - at) / variance);
+    const double root = std::sqrt(std::abs(std::min(ratio, most) - 1.0) / variance);
     d = root * P.col(k).head(n);
     if (ratio > 1.0) {  // makes unsure and moves nothing: no better mean is found by stretching what a prior has held
       for (int j = 0; j < n; ++j) P.col(j).head(n) += d(j) * d;

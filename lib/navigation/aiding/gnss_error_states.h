@@ -10,8 +10,9 @@ namespace roadfix::navigation {
 /// anything else.
 void reset_gnss_bias(Filter& filter, const Eigen::Vector3d& std);
 /// The prior variance of the error at kGnssBias or kGnssVelocityBias becomes `ratio` times what it was, (N.5.12): as if it
-/// had been measured as zero, or such a measurement were taken back.
-void rescale_gnss_bias(Filter& filter, int at, double ratio);
+/// had been measured as zero, or such a measurement were taken back. `stationary`: its variance then, (m or m/s)^2, level
+/// axes; no measurement is taken back that would make it larger.
+void rescale_gnss_bias(Filter& filter, int at, double ratio, const Eigen::Vector3d& stationary);
 
 /// The receiver comes back from an outage with an error of this standard deviation (m, level axes) that fades at a rate
 /// nobody knows, (N.5.2).

@@ -125,7 +125,7 @@ void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
   set_noise(filter, bias);
   const bool other_share = share_ > 0.0 && bias.like.share != share_;
   if (!bias.anew && other_share && config_.facts.has_imu && !displaced())
-    rescale_gnss_bias(filter, kGnssBias, bias.like.share / share_);
+    rescale_gnss_bias(filter, kGnssBias, bias.like.share / share_, bias.std.cwiseAbs2());
   share_ = bias.like.share;
   begin(filter, bias);
 }

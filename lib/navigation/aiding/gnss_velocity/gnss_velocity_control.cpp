@@ -89,7 +89,8 @@ void GnssVelocityControl::watch(Filter& filter, const Queued& velocity, const Ei
   const double share = models_.mean().share;
   models_.add(
       {velocity.t_us, before, off_way(filter, velocity), velocity.cov.diagonal().head<2>(), drift_rate(filter)});
-  rescale_gnss_bias(filter, kGnssVelocityBias, models_.mean().share / share);
+  const double ratio = models_.mean().share / share;
+  rescale_gnss_bias(filter, kGnssVelocityBias, ratio, ratio * filter.gnss_bias().velocity_std.cwiseAbs2());
 }
 
 AidingRecord GnssVelocityControl::try_on(Filter& filter, const Queued& velocity) const {
