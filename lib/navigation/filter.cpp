@@ -152,7 +152,7 @@ Eigen::Matrix<double, Rows, 1> Filter::residual(const Measurement<Rows>& m) cons
 template <int Rows>
 void Filter::reject(const Measurement<Rows>& m) {
   const Innovation<Rows> innovation(m.residual, innovation_covariance(m));
-  if (!innovation.usable) return;
+  if (!innovation.usable || !m.shows_steps) return;
   steps_.begin_at_surprise(state_, motion(), innovation.nis, Rows);
   steps_.reject<Rows>(state_, at_epoch(m), innovation.L, innovation.whitened, m.shows_antenna);
 }
@@ -209,12 +209,13 @@ template <int Rows>
 AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<Rows>& m, double gate) {
   if (state_.held()) flush();
   const AidingRecord record = judge(source, t_us, m, gate);
-  if (record.status == AidingStatus::kGated) reject(m);
+  // Of slow wheels a scale does not show, and the noise of speeds without a sign is rectified.
+  constexpr double kSlow = 2.0;  // m/s
+  const bool slow = source == AidingSource::kWheelSpeed && state_.x.nav.velocity.squaredNorm() < kSlow * kSlow;
+  if (record.status == AidingStatus::kGated && !slow) reject(m);
   if (record.status != AidingStatus::kAccepted) return record;
   flush();
-  // Slow, a scale does not show, and the noise of speeds without a sign is rectified.
-  constexpr double kSlow = 2.0;  // m/s
-  apply(m, state_.x.nav.velocity.squaredNorm() > kSlow * kSlow);
+  apply(m, m.shows_steps && !slow);
   return record;
 }
 

@@ -25,6 +25,7 @@ struct Measurement {
       0.0;  ///< added to R's diagonal in the update alone: errors that the next ones repeat (Bartlett 1946)
   Considered considered;
   bool shows_antenna = true;  ///< it is evidence of the antenna's place
+  bool shows_steps = true;    ///< it is evidence of what has jumped
 };
 
 enum class AidingSource {

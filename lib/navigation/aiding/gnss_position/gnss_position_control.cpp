@@ -124,6 +124,7 @@ void GnssPositionControl::set_noise(Filter& filter, const Bias& bias) const {
 void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
   set_noise(filter, bias);
   const bool other_share = share_ > 0.0 && bias.like.share != share_;
+  m.shows_steps = !displaced();  // how a displacement moves is assumed
   if (!bias.anew && other_share && config_.facts.has_imu && !displaced())
     rescale_gnss_bias(filter, kGnssBias, bias.like.share / share_, bias.std.cwiseAbs2());
   share_ = bias.like.share;
