@@ -219,15 +219,16 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
   return record;
 }
 
-std::optional<StepDetector::Step> Filter::mend_step(double sigmas, bool displaced) {
-  if (!steps_.take_fresh() || !steps_.most_likely(sigmas, displaced)) {
-    steps_.advance(state_, motion(), displaced);
-    return std::nullopt;
-  }
-  flush();
-  const std::optional<StepDetector::Step> step = steps_.most_likely(sigmas, displaced);
-  steps_.take_back(*step, state_, motion());
+std::optional<StepDetector::Step> Filter::likely_step(double sigmas, bool displaced, bool rejected) {
+  std::optional<StepDetector::Step> step;
+  if (steps_.take_fresh()) step = steps_.most_likely(sigmas, displaced, rejected);
+  if (!step) steps_.advance(state_, motion(), displaced);
   return step;
+}
+
+void Filter::take_back(const StepDetector::Step& step) {
+  flush();
+  steps_.take_back(step, state_, motion());
 }
 
 void Filter::widen(const BaseVector& d) {

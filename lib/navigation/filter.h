@@ -50,8 +50,9 @@ class Filter {
 
   /// Watches for steps from now on, (N.5.8).
   void watch_for_steps() { steps_.begin(state_, motion()); }
-  /// A step that explains the innovations better than chance does at this many sigmas is taken back.
-  std::optional<StepDetector::Step> mend_step(double sigmas, bool displaced);
+  /// The step that explains the innovations better than chance does at this many sigmas; the rest as of StepDetector.
+  std::optional<StepDetector::Step> likely_step(double sigmas, bool displaced, bool rejected);
+  void take_back(const StepDetector::Step& step);
 
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] State& state() { return state_; }

@@ -163,8 +163,10 @@ void Navigation::align(const MotionInput::Step& now) {
   const auto aid = [&](const auto& use_on, int64_t id = 0) { log_.add(all.aid(use_on), id); };
   measurements_.queue().take_due([&]() -> const Mean& { return all.leader().state().x; },
                                  [&](const Queued& q) {
+                                   const bool position = q.kind == Queued::Kind::kPosition;
+                                   if (position) aiding_.gnss_position().see(q.t_us);
                                    aid([&](Filter& f) { return aiding_.try_on(f, q); }, q.id);
-                                   if (q.kind != Queued::Kind::kPosition) return;
+                                   if (!position) return;
                                    aiding_.gnss_position().tried(q);
                                    start_.fix_agreed();
                                  });

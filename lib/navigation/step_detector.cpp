@@ -9,7 +9,8 @@ namespace {
 
 constexpr int kApart_us = 500'000;      // between two moments
 constexpr int kFirst_us = 1'000'000;    // between two of the first octave
-constexpr double kMoreOf = 2.0;         // of two surprises within a second, that the second is another
+constexpr int kRun_us = 1'500'000;      // from one surprise to the next of the same
+constexpr double kMoreOf = 2.0;         // how much larger a surprise is that is another
 constexpr double kMostOfIt = 0.5;       // of what the innovations have too much, at least, is the step's
 constexpr double kLeastEvidence = 3.0;  // measurements; fewer are outliers
 constexpr double kMemory = 16.0;        // s, as far back as a step is looked for
@@ -36,6 +37,7 @@ constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
                                 Block{StepKind::kReceiverClock, kReceiverClock, 1, 2.0, true},
                                 Block{StepKind::kWheelClock, kWheelClock, 1, 2.0},
                                 Block{StepKind::kLeverArm, kAntennaPlace, StepDetector::kAntennaSize, 3.0}};
+constexpr bool of_receiver(StepKind kind) { return kind == StepKind::kReceiver || kind == StepKind::kReceiverClock; }
 constexpr int column_of(int at) { return at < StepDetector::kWidth ? at : at - StepDetector::kWidth; }
 
 /// A step given the evidence: mean, covariance, and the logarithm of the Bayes factor. Its prior is normal where it is not
@@ -122,8 +124,9 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
 void StepDetector::begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows) {
   const int64_t t_us = state.x.t_us;
   if (!watches_ || whitened_square < kMostSquare + rows) return;
-  if (t_us < surprised_us_ + kFirst_us && whitened_square < kMoreOf * surprise_) return;
+  const bool of_a_run = t_us < surprised_us_ + kRun_us;
   surprised_us_ = t_us;
+  if (of_a_run && whitened_square < kMoreOf * surprise_) return;
   surprise_ = whitened_square;
   latest_ = 1 - latest_;
   begin(state, motion, kSurprises + latest_);
@@ -212,7 +215,7 @@ StepDetector::Fit StepDetector::best_of(size_t block) const {
   return best;
 }
 
-std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool displaced) const {
+std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool displaced, bool rejected) const {
   if (!watches_) return std::nullopt;
   std::array<Fit, kBlocks.size()> fits;
   size_t best = 0;
@@ -226,6 +229,7 @@ std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool 
     if (kBlocks[k].kind != kBlocks[best].kind && (fits[best].step.log_odds < fits[k].step.log_odds + kBeyondOthers ||
                                                   fits[best].likelihood < fits[k].likelihood + kBeyondOthers))
       return std::nullopt;
+  if (rejected && of_receiver(kBlocks[best].kind)) return std::nullopt;
   return fits[best].step;
 }
 

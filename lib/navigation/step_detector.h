@@ -67,8 +67,8 @@ class StepDetector {
   /// tells nothing of where its antenna is.
   void advance(State& state, const BodyMotion& motion, bool displaced);
 
-  /// Before use() or reject() of an innovation of `rows` rows: where one surprises a moment begins, at most once a second but
-  /// for larger ones: by a moment half a second beside it a step is found late.
+  /// Before use() or reject() of an innovation of `rows` rows: where one surprises a moment begins, but not at those that go on
+  /// surprising as much: by a moment half a second beside it a step is found late.
   void begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows);
 
   /// The filter's covariance step over T s.
@@ -97,8 +97,9 @@ class StepDetector {
 
   /// The step that explains most, unless chance does at this many sigmas, something else makes the innovations large, or
   /// another kind explains as much. `displaced`: the receiver is known to be: its steps are the filter's to follow, and
-  /// its antenna is asked for no place.
-  [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced) const;
+  /// its antenna is asked for no place. `rejected`: its fixes are, and do no harm, so that there is time to tell how they
+  /// are wrong.
+  [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced, bool rejected) const;
   /// Takes `step` back: what it has made of all errors goes out of the means, how well it is known into the covariance, whose
   /// epoch is the state's; the one before is doubted where it was of another kind, (N.5.11). Watches anew.
   void take_back(const Step& step, State& state, const BodyMotion& motion);

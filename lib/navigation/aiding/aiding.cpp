@@ -108,8 +108,15 @@ bool Aiding::mend_step(Filter& filter, bool frozen) {
     filter.watch_for_steps();
     return false;
   }
-  const auto step = filter.mend_step(config_.aiding.gate_sigma, gnss_position_.displaced());
+  const auto step = filter.likely_step(config_.aiding.gate_sigma, gnss_position_.displaced(),
+                                       gnss_position_.waits(filter.state().x.t_us));
   if (!step) return false;
+  if (step->kind == StepKind::kReceiver && gnss_position_.rejects()) {
+    gnss_position_.displace(filter);
+    filter.watch_for_steps();
+    return false;
+  }
+  filter.take_back(*step);
   if (step->kind == StepKind::kWheels) ++wheel_steps_;
   if (step->kind == StepKind::kLeverArm) arm_contradicted_ = true;
   // The filter's way is broken: no source compares what came before with what comes.

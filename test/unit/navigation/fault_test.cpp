@@ -67,6 +67,23 @@ TEST_CASE("fixes 15 m off for half a minute are not followed") {
   check_held(drive_with("gnss.bias@60+30:east_m=15", 120.0, 2), 1.5, 0.2);
 }
 
+TEST_CASE("fixes 3 m off from where the car pulls away on are no drag, and the wheels are not wrong") {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    CAPTURE(seed);
+    check_held(drive_with("gnss.bias@40+20:north_m=3", 100.0, seed), 0.3, 0.1);
+  }
+  // Teeth: what passes the gate is followed.
+  CHECK(drive_with("gnss.ramp@40+100:east_mps=0.005", 140.0, 3).horizontal > 0.3);
+}
+
+TEST_CASE("a receiver's clock that is wrong for two seconds is waited for, and one that stays wrong is found") {
+  check_held(drive_with("gnss.clock@56.8+2:offset_s=-0.6", 100.0, 1), 0.1, 0.1);
+  check_held(drive_with("gnss.clock@48.4+2:offset_s=-0.6", 100.0, 2), 0.1, 0.1);
+  check_held(drive_with("gnss.clock@48.4:offset_s=-0.1", 100.0, 2), 0.2, 0.1);
+  // Teeth: without the step detector.
+  CHECK(drive_with("gnss.clock@48.4:offset_s=-0.1", 100.0, 2, nullptr, false).horizontal > 0.4);
+}
+
 TEST_CASE("what is known against a receiver outlasts an IMU that is silent for two seconds") {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const Worst w = drive_with("gnss.bias@60+40:east_m=6", 90.0, seed, "imu.silence@70+2");

@@ -29,6 +29,7 @@ constexpr double kDisplacedWalk = 0.5;      // m/sqrt(s), of a displacement
 constexpr double kLongestDisplaced = 60.0;  // s: for longer a receiver is seldom displaced, and the filter is wrong
 constexpr double kBack = 7.0;               // logarithm of the odds (1000 to 1) that it is no longer displaced
 constexpr double kBackSigmas = 3.0;         // of its usual error, within which a displaced height is back
+constexpr double kPatience = 3.0;           // s of rejected fixes, for which nothing is missing, and after them
 constexpr double kTooLong = 5.0;            // s of rejected fixes that agree, without a step that explains them
 constexpr double kTailFreedom = 3.0;        // Student's t: errors of filters and receivers have heavy tails
 constexpr int kRunForFilter = 2, kRunForReceiver = 3;  // rejected fixes that agree, to decide
@@ -38,6 +39,14 @@ constexpr double kAlikeShare = 0.2;                    // of their size, by whic
 double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
   const double m = off.dot(cov.inverse() * off);
   return -0.5 * std::log(cov.determinant()) - 0.5 * (kTailFreedom + 2.0) * std::log1p(m / kTailFreedom);
+}
+
+Measurement<2> level_of(const Measurement<3>& all) {
+  Measurement<2> level;
+  level.residual = all.residual.head<2>();
+  level.H = all.H.topRows<2>();
+  level.R = all.R.topLeftCorner<2, 2>();
+  return level;
 }
 
 /// Level, m: a fix less the antenna, with the receiver's error in it.
@@ -76,10 +85,35 @@ Eigen::Vector3d GnssPositionControl::return_std(const GnssFix& fix) const {
   return returns(fix.t_us, fix.fix_type) ? kReturn : Eigen::Vector3d::Zero();
 }
 
+bool GnssPositionControl::waits(int64_t t_us) const {
+  const bool over_lately = run_over_us_ != 0 && seconds_between(run_over_us_, t_us) < kPatience;
+  return outage_ || over_lately || (refused_ > 0 && seconds_between(used_at_us_, t_us) < kPatience);
+}
+
+/// What was rejected has moved nothing, and the way is what it was.
+void GnssPositionControl::displace(Filter& filter) {
+  set_displaced(filter.state().x.t_us);
+  BaseVector wider = BaseVector::Zero();
+  wider.segment<3>(kGnssBias) = newest_off_;
+  filter.widen(wider);
+}
+
+bool GnssPositionControl::after_outage(int64_t t_us) const {
+  return used_at_us_ != 0 && (outage_ || seconds_between(seen_at_us_, t_us) > kOutage);
+}
+
+/// What displaced the receiver is over with its signals.
+void GnssPositionControl::see(int64_t t_us) {
+  if (!outage_ && after_outage(t_us)) {
+    outage_ = true;
+    displaced_since_us_ = 0;
+  }
+  seen_at_us_ = t_us;
+}
+
 /// After an outage a receiver without a fixed phase may come back displaced.
 bool GnssPositionControl::returns(int64_t t_us, FixType type) const {
-  return used_at_us_ != 0 && seconds_between(used_at_us_, t_us) > kOutage && type != FixType::kRtkFixed &&
-         config_.aiding.lasting_errors;
+  return after_outage(t_us) && type != FixType::kRtkFixed && config_.aiding.lasting_errors;
 }
 
 GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const {
@@ -87,8 +121,7 @@ GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const 
   Bias bias;
   bias.like = lasting(fix.fix_type);
   bias.std = (bias.like.share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
-  const bool after_outage = used_at_us_ != 0 && seconds_between(used_at_us_, fix.t_us) > kOutage;
-  bias.anew = used_at_us_ == 0 || after_outage || fix.fix_type != last_type_;
+  bias.anew = used_at_us_ == 0 || after_outage(fix.t_us) || fix.fix_type != last_type_;
   bias.returns = returns(fix.t_us, fix.fix_type);
   return bias;
 }
@@ -99,6 +132,7 @@ Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queu
   const double white = (1.0 - bias.like.share) * r.scale.variance_factor();
   Measurement<3> m =
       gnss_position(filter.state(), filter.motion(), fix.value, white * fix.cov, fix.ahead(filter.state().x));
+  m.shows_steps = !displaced();  // how a displacement moves is assumed
   if (!bias.anew) return m;
   m.residual += filter.state().x.gnss_bias;
   m.H.middleCols<3>(kGnssBias).setZero();
@@ -124,7 +158,6 @@ void GnssPositionControl::set_noise(Filter& filter, const Bias& bias) const {
 void GnssPositionControl::set_bias(Filter& filter, const Bias& bias) {
   set_noise(filter, bias);
   const bool other_share = share_ > 0.0 && bias.like.share != share_;
-  m.shows_steps = !displaced();  // how a displacement moves is assumed
   if (!bias.anew && other_share && config_.facts.has_imu && !displaced())
     rescale_gnss_bias(filter, kGnssBias, bias.like.share / share_, bias.std.cwiseAbs2());
   share_ = bias.like.share;
@@ -184,6 +217,7 @@ AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued&
 }
 
 AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
+  see(fix.t_us);
   Bias bias = bias_of(fix);
   if (heavy_tailed(fix.fix_type)) return use_heavy_tailed(filter, fix, bias);
   last_place_.reset();
@@ -217,7 +251,8 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   if (r.status == AidingStatus::kReset) forget_way();
   if (r.status == AidingStatus::kAccepted || r.status == AidingStatus::kReset) {
     note(fix.t_us, fix.fix_type);
-    rejected_ = 0;
+    if (refused_ >= kRunForReceiver && !displaced() && r.status == AidingStatus::kAccepted) run_over_us_ = fix.t_us;
+    rejected_ = refused_ = 0;
   }
   return r;
 }
@@ -234,9 +269,11 @@ bool GnssPositionControl::jumped_back(const Filter& filter, const Queued& fix, c
 bool GnssPositionControl::is_back(Filter& filter, const Queued& fix, const Bias& bias, double log_likelihood) {
   Bias none = bias;
   none.anew = true;
-  const AidingRecord r =
-      filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, none), gates_.nis[3]);
-  if (r.status != AidingStatus::kAccepted) {
+  const Measurement<3> m = measurement(filter, fix, none);
+  const AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, m, gates_.nis[3]);
+  // The height drifts in an outage more than the filter knows, and is no reason to stay displaced.
+  const AidingRecord level = filter.judge(AidingSource::kGnssPosition, fix.t_us, level_of(m), gates_.nis[2]);
+  if (level.status != AidingStatus::kAccepted) {
     back_ = 0.0;
     return false;
   }
@@ -279,13 +316,6 @@ void GnssPositionControl::watch(const Filter& filter, const Queued& fix, const B
 
 /// The height alone contradicts: it becomes an error of the receiver's height, which fades as its errors do.
 AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix, const Bias& bias) {
-  const auto level_of = [](const Measurement<3>& all) {
-    Measurement<2> level;
-    level.residual = all.residual.head<2>();
-    level.H = all.H.topRows<2>();
-    level.R = all.R.topLeftCorner<2, 2>();
-    return level;
-  };
   const AidingRecord r =
       filter.judge(AidingSource::kGnssPosition, fix.t_us, level_of(measurement(filter, fix, bias)), gates_.nis[2]);
   if (r.status != AidingStatus::kAccepted) return r;
@@ -307,7 +337,9 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
   AidingRecord r = rejected;
   const Measurement<3> m = measurement(filter, fix, bias);
   filter.reject(m);
+  ++refused_;
   const Eigen::Vector3d off = m.residual;
+  newest_off_ = off;
   const double noise = std::sqrt(2.0 * gates_.nis[2] * (m.R(0, 0) + m.R(1, 1)));
   const double apart = (off - first_off_).head<2>().norm();
   if (rejected_ == 0 || apart > noise + kAlikeShare * off.head<2>().norm()) {
@@ -318,8 +350,8 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
     return r;
   }
   ++rejected_;
-  const bool after_outage = seconds_between(used_at_us_, rejected_since_us_) > kOutage;
-  if (!after_outage && seconds_between(rejected_since_us_, fix.t_us) < kTooLong) return r;
+  const bool late = seconds_between(used_at_us_, rejected_since_us_) > kOutage;
+  if (!late && seconds_between(rejected_since_us_, fix.t_us) < kTooLong) return r;
   const Eigen::Matrix2d S =
       Eigen::Vector2d(rejected.innovation_variance[0], rejected.innovation_variance[1]).asDiagonal();
   const double wrong_filter = log_tail(off.head<2>(), S);
@@ -327,7 +359,10 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
                            log_tail(off.head<2>(), kDisplacement * kDisplacement * Eigen::Matrix2d::Identity() + S);
   const bool filter_is_wrong = wrong_filter >= displaced;
   if (rejected_ < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
-  if (!filter_is_wrong) set_displaced(fix.t_us);
+  if (!filter_is_wrong) {
+    set_displaced(fix.t_us);
+    filter.watch_for_steps();  // what the run was evidence of is decided
+  }
   set_bias(filter, bias);
   const Bias now = bias.begun();
   if (filter_is_wrong) {

@@ -23,6 +23,8 @@ class GnssPositionControl {
 
   /// `status` kReset: the filter was found wrong and took the fix.
   AidingRecord use(Filter& filter, const Queued& fix);
+  /// A fix of this time has come, whatever becomes of it; use() and started_with() know.
+  void see(int64_t t_us);
   /// For a hypothesis of the start: no gate, no learning.
   AidingRecord try_on(Filter& filter, const Queued& fix) const;
   /// A fix was tried on the hypotheses of a start, or made them.
@@ -38,11 +40,18 @@ class GnssPositionControl {
     back_ = 0.0;
   }
   [[nodiscard]] bool displaced() const { return displaced_since_us_ != 0; }
+  /// The newest fixes were rejected.
+  [[nodiscard]] bool rejects() const { return refused_ > 0; }
+  /// They have not been for long, or a run of them was until lately: how the receiver is wrong may show yet. After an outage
+  /// use() decides.
+  [[nodiscard]] bool waits(int64_t t_us) const;
+  /// The receiver of the rejected fixes is displaced, by what the newest is off.
+  void displace(Filter& filter);
   /// The height alone is displaced.
   [[nodiscard]] bool height_displaced() const { return height_displaced_; }
   /// The filter has a gap in its past: nothing holds against the receiver.
   void clear_run() {
-    rejected_ = 0;
+    rejected_ = refused_ = 0;
     forget_way();
   }
   /// The way driven is broken (a gap, a step that was taken back): older fixes are not compared with newer ones.
@@ -62,8 +71,8 @@ class GnssPositionControl {
       r.scale.serialise(a);
       r.lasting.serialise(a);
     }
-    a(used_at_us_, last_type_, share_, rejected_, rejected_since_us_, displaced_since_us_, back_, first_off_,
-      height_displaced_, way_, way_std_, last_spread_);
+    a(used_at_us_, seen_at_us_, run_over_us_, outage_, refused_, last_type_, share_, rejected_, rejected_since_us_,
+      displaced_since_us_, back_, first_off_, newest_off_, height_displaced_, way_, way_std_, last_spread_);
     error_time_.serialise(a);
     serialise_optional(
         a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
@@ -87,13 +96,17 @@ class GnssPositionControl {
 
   [[nodiscard]] const Receiver& receiver(FixType type) const { return receivers_[static_cast<size_t>(type)]; }
   void note(int64_t t_us, FixType type) {
-    used_at_us_ = t_us;
+    used_at_us_ = seen_at_us_ = t_us;
+    outage_ = false;
     last_type_ = type;
   }
   void note_start(int64_t t_us, FixType type) {
+    see(t_us);
     note(t_us, type);
     share_ = lasting(type).share;
   }
+  /// Rejected ones are no outage.
+  [[nodiscard]] bool after_outage(int64_t t_us) const;
   [[nodiscard]] bool returns(int64_t t_us, FixType type) const;
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
@@ -119,12 +132,17 @@ class GnssPositionControl {
   Gates gates_, open_;
   std::array<Receiver, 6> receivers_;  // by FixType
   int64_t used_at_us_ = 0;             // or tried on the hypotheses of a start
+  int64_t seen_at_us_ = 0;             // used or not
+  int64_t run_over_us_ = 0;            // a run of rejected ones, at one that agreed with the filter
+  int refused_ = 0;                    // since one was used
+  bool outage_ = false;                // before one that has been seen, and none has been used since
   FixType last_type_ = FixType::kNone;
   double share_ = 0.0;  // of the variance, that b has been taken to have
   int rejected_ = 0;    // in a row, that agree with each other
   int64_t rejected_since_us_ = 0, displaced_since_us_ = 0;
-  double back_ = 0.0;                                    // logarithm of the odds that it is no longer displaced
-  Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();  // innovation of the first of them
+  double back_ = 0.0;                                     // logarithm of the odds that it is no longer displaced
+  Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();   // innovation of the first of them
+  Eigen::Vector3d newest_off_ = Eigen::Vector3d::Zero();  // of the newest rejected one
   bool height_displaced_ = false;
   ErrorTime error_time_;                           // of code receivers
   Eigen::Vector2d way_ = Eigen::Vector2d::Zero();  // m, gone without what fixes have corrected
