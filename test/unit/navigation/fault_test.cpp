@@ -235,7 +235,9 @@ TEST_CASE("a place that is the same to the last bit tells nothing of a car that 
   CHECK(input.screen(fix, 2.0) == AidingStatus::kAccepted);
 }
 
-TEST_CASE("a receiver's clock that is off for two seconds is found out, and found to be right again") {
+TEST_CASE(
+    "a receiver's clock that is off for two seconds costs little at any moment, and one that is off for good is "
+    "found") {
   for (const char* fault : {"gnss.clock@25.5+2:offset_s=0.4", "gnss.clock@31+2:offset_s=0.4",
                             "gnss.clock@31.5+2:offset_s=0.4", "gnss.clock@40.5+2:offset_s=-0.6"}) {
     CAPTURE(fault);

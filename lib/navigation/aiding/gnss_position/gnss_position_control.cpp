@@ -56,6 +56,13 @@ Eigen::Vector2d off_way(const Filter& filter, const Queued& fix) {
   return (m.residual + s.x.gnss_bias + s.x.gnss_return).head<2>();
 }
 
+/// The receiver may be off by this much more (m, level axes).
+void widen_bias(Filter& filter, const Eigen::Vector3d& off) {
+  BaseVector wider = BaseVector::Zero();
+  wider.segment<3>(kGnssBias) = off;
+  filter.widen(wider);
+}
+
 /// What a receiver brought back has faded.
 void settle(Filter& filter, const Queued& fix) {
   const State& s = filter.state();
@@ -93,9 +100,7 @@ bool GnssPositionControl::waits(int64_t t_us) const {
 /// What was rejected has moved nothing, and the way is what it was.
 void GnssPositionControl::displace(Filter& filter) {
   set_displaced(filter.state().x.t_us);
-  BaseVector wider = BaseVector::Zero();
-  wider.segment<3>(kGnssBias) = newest_off_;
-  filter.widen(wider);
+  widen_bias(filter, newest_off_);
 }
 
 bool GnssPositionControl::after_outage(int64_t t_us) const {
@@ -324,9 +329,7 @@ AidingRecord GnssPositionControl::use_level(Filter& filter, const Queued& fix, c
   const Bias now = bias.begun();
   const Measurement<3> all = measurement(filter, fix, now);
   (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, level_of(all), Gates::open().nis[2]);
-  BaseVector wider = BaseVector::Zero();
-  wider(kGnssBias + 2) = all.residual(2);
-  filter.widen(wider);
+  widen_bias(filter, all.residual(2) * Eigen::Vector3d::UnitZ());
   return r;
 }
 
@@ -365,13 +368,10 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
   }
   set_bias(filter, bias);
   const Bias now = bias.begun();
-  if (filter_is_wrong) {
+  if (filter_is_wrong)
     widen_filter(filter, fix, off);
-  } else {
-    BaseVector wider = BaseVector::Zero();
-    wider.segment<3>(kGnssBias) = off;
-    filter.widen(wider);
-  }
+  else
+    widen_bias(filter, off);
   r = filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, now), Gates::open().nis[3]);
   if (filter_is_wrong) r.status = AidingStatus::kReset;
   return r;
