@@ -219,9 +219,9 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
   return record;
 }
 
-std::optional<StepDetector::Step> Filter::likely_step(double sigmas, bool displaced, bool rejected) {
+std::optional<StepDetector::Step> Filter::likely_step(double sigmas, bool displaced, bool receiver_waits) {
   std::optional<StepDetector::Step> step;
-  if (steps_.take_fresh()) step = steps_.most_likely(sigmas, displaced, rejected);
+  if (steps_.take_fresh()) step = steps_.most_likely(sigmas, displaced, receiver_waits);
   if (!step) steps_.advance(state_, motion(), displaced);
   return step;
 }

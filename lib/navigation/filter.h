@@ -51,7 +51,7 @@ class Filter {
   /// Watches for steps from now on, (N.5.8).
   void watch_for_steps() { steps_.begin(state_, motion()); }
   /// The step that explains the innovations better than chance does at this many sigmas; the rest as of StepDetector.
-  std::optional<StepDetector::Step> likely_step(double sigmas, bool displaced, bool rejected);
+  std::optional<StepDetector::Step> likely_step(double sigmas, bool displaced, bool receiver_waits);
   void take_back(const StepDetector::Step& step);
 
   [[nodiscard]] const State& state() const { return state_; }

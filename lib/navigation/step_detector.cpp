@@ -215,7 +215,7 @@ StepDetector::Fit StepDetector::best_of(size_t block) const {
   return best;
 }
 
-std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool displaced, bool rejected) const {
+std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool displaced, bool receiver_waits) const {
   if (!watches_) return std::nullopt;
   std::array<Fit, kBlocks.size()> fits;
   size_t best = 0;
@@ -229,7 +229,7 @@ std::optional<StepDetector::Step> StepDetector::most_likely(double sigmas, bool 
     if (kBlocks[k].kind != kBlocks[best].kind && (fits[best].step.log_odds < fits[k].step.log_odds + kBeyondOthers ||
                                                   fits[best].likelihood < fits[k].likelihood + kBeyondOthers))
       return std::nullopt;
-  if (rejected && of_receiver(kBlocks[best].kind)) return std::nullopt;
+  if (receiver_waits && of_receiver(kBlocks[best].kind)) return std::nullopt;
   return fits[best].step;
 }
 

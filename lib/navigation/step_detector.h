@@ -97,9 +97,9 @@ class StepDetector {
 
   /// The step that explains most, unless chance does at this many sigmas, something else makes the innovations large, or
   /// another kind explains as much. `displaced`: the receiver is known to be: its steps are the filter's to follow, and
-  /// its antenna is asked for no place. `rejected`: its fixes are, and do no harm, so that there is time to tell how they
-  /// are wrong.
-  [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced, bool rejected) const;
+  /// its antenna is asked for no place. `receiver_waits`: how it is wrong may
+  /// show yet, and its steps wait.
+  [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced, bool receiver_waits) const;
   /// Takes `step` back: what it has made of all errors goes out of the means, how well it is known into the covariance, whose
   /// epoch is the state's; the one before is doubted where it was of another kind, (N.5.11). Watches anew.
   void take_back(const Step& step, State& state, const BodyMotion& motion);

@@ -33,7 +33,6 @@ constexpr double kPatience = 3.0;           // s of rejected fixes, for which no
 constexpr double kTooLong = 5.0;            // s of rejected fixes that agree, without a step that explains them
 constexpr double kTailFreedom = 3.0;        // Student's t: errors of filters and receivers have heavy tails
 constexpr int kRunForFilter = 2, kRunForReceiver = 3;  // rejected fixes that agree, to decide
-constexpr double kAlikeShare = 0.2;                    // of their size, by which fixes of a run may differ
 
 /// Student's t in two dimensions, without its constant.
 double log_tail(const Eigen::Vector2d& off, const Eigen::Matrix2d& cov) {
@@ -93,14 +92,13 @@ Eigen::Vector3d GnssPositionControl::return_std(const GnssFix& fix) const {
 }
 
 bool GnssPositionControl::waits(int64_t t_us) const {
-  const bool over_lately = run_over_us_ != 0 && seconds_between(run_over_us_, t_us) < kPatience;
-  return outage_ || over_lately || (refused_ > 0 && seconds_between(used_at_us_, t_us) < kPatience);
+  return outage_ || run_.over_within(t_us, kPatience) || (rejects() && seconds_between(used_at_us_, t_us) < kPatience);
 }
 
 /// What was rejected has moved nothing, and the way is what it was.
 void GnssPositionControl::displace(Filter& filter) {
   set_displaced(filter.state().x.t_us);
-  widen_bias(filter, newest_off_);
+  widen_bias(filter, run_.newest_off());
 }
 
 bool GnssPositionControl::after_outage(int64_t t_us) const {
@@ -256,8 +254,7 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   if (r.status == AidingStatus::kReset) forget_way();
   if (r.status == AidingStatus::kAccepted || r.status == AidingStatus::kReset) {
     note(fix.t_us, fix.fix_type);
-    if (refused_ >= kRunForReceiver && !displaced() && r.status == AidingStatus::kAccepted) run_over_us_ = fix.t_us;
-    rejected_ = refused_ = 0;
+    run_.end(fix.t_us, r.status == AidingStatus::kAccepted && !displaced());
   }
   return r;
 }
@@ -340,28 +337,20 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
   AidingRecord r = rejected;
   const Measurement<3> m = measurement(filter, fix, bias);
   filter.reject(m);
-  ++refused_;
   const Eigen::Vector3d off = m.residual;
-  newest_off_ = off;
   const double noise = std::sqrt(2.0 * gates_.nis[2] * (m.R(0, 0) + m.R(1, 1)));
-  const double apart = (off - first_off_).head<2>().norm();
-  if (rejected_ == 0 || apart > noise + kAlikeShare * off.head<2>().norm()) {
-    if (rejected_ > 0) receivers_[static_cast<size_t>(fix.fix_type)].scale.learn(r);
-    if (rejected_ == 0) rejected_since_us_ = fix.t_us;
-    rejected_ = 1;
-    first_off_ = off;
-    return r;
-  }
-  ++rejected_;
-  const bool late = seconds_between(used_at_us_, rejected_since_us_) > kOutage;
-  if (!late && seconds_between(rejected_since_us_, fix.t_us) < kTooLong) return r;
+  const RejectedRun::Next next = run_.add(fix.t_us, off, noise);
+  if (next == RejectedRun::Next::kDiffers) learn(fix, r);
+  if (next != RejectedRun::Next::kAgrees) return r;
+  const bool late = seconds_between(used_at_us_, run_.since_us()) > kOutage;
+  if (!late && seconds_between(run_.since_us(), fix.t_us) < kTooLong) return r;
   const Eigen::Matrix2d S =
       Eigen::Vector2d(rejected.innovation_variance[0], rejected.innovation_variance[1]).asDiagonal();
   const double wrong_filter = log_tail(off.head<2>(), S);
   const double displaced = std::log(kDisplacedPrior) +
                            log_tail(off.head<2>(), kDisplacement * kDisplacement * Eigen::Matrix2d::Identity() + S);
   const bool filter_is_wrong = wrong_filter >= displaced;
-  if (rejected_ < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
+  if (run_.agreeing() < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
   if (!filter_is_wrong) {
     set_displaced(fix.t_us);
     filter.watch_for_steps();  // what the run was evidence of is decided

@@ -11,6 +11,7 @@
 #include "navigation/aiding/gates.h"
 #include "navigation/aiding/gnss_position/error_time.h"
 #include "navigation/aiding/gnss_position/lasting_error.h"
+#include "navigation/aiding/gnss_position/rejected_run.h"
 #include "navigation/aiding/noise_scale.h"
 #include "navigation/measurement_queue.h"
 #include "navigation/serialise_optional.h"
@@ -41,7 +42,7 @@ class GnssPositionControl {
   }
   [[nodiscard]] bool displaced() const { return displaced_since_us_ != 0; }
   /// The newest fixes were rejected.
-  [[nodiscard]] bool rejects() const { return refused_ > 0; }
+  [[nodiscard]] bool rejects() const { return !run_.empty(); }
   /// They have not been for long, or a run of them was until lately: how the receiver is wrong may show yet. After an outage
   /// use() decides.
   [[nodiscard]] bool waits(int64_t t_us) const;
@@ -51,7 +52,7 @@ class GnssPositionControl {
   [[nodiscard]] bool height_displaced() const { return height_displaced_; }
   /// The filter has a gap in its past: nothing holds against the receiver.
   void clear_run() {
-    rejected_ = refused_ = 0;
+    run_.clear();
     forget_way();
   }
   /// The way driven is broken (a gap, a step that was taken back): older fixes are not compared with newer ones.
@@ -71,8 +72,9 @@ class GnssPositionControl {
       r.scale.serialise(a);
       r.lasting.serialise(a);
     }
-    a(used_at_us_, seen_at_us_, run_over_us_, outage_, refused_, last_type_, share_, rejected_, rejected_since_us_,
-      displaced_since_us_, back_, first_off_, newest_off_, height_displaced_, way_, way_std_, last_spread_);
+    a(used_at_us_, seen_at_us_, outage_, last_type_, share_, displaced_since_us_, back_, height_displaced_, way_,
+      way_std_, last_spread_);
+    run_.serialise(a);
     error_time_.serialise(a);
     serialise_optional(
         a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
@@ -133,16 +135,12 @@ class GnssPositionControl {
   std::array<Receiver, 6> receivers_;  // by FixType
   int64_t used_at_us_ = 0;             // or tried on the hypotheses of a start
   int64_t seen_at_us_ = 0;             // used or not
-  int64_t run_over_us_ = 0;            // a run of rejected ones, at one that agreed with the filter
-  int refused_ = 0;                    // since one was used
   bool outage_ = false;                // before one that has been seen, and none has been used since
   FixType last_type_ = FixType::kNone;
   double share_ = 0.0;  // of the variance, that b has been taken to have
-  int rejected_ = 0;    // in a row, that agree with each other
-  int64_t rejected_since_us_ = 0, displaced_since_us_ = 0;
-  double back_ = 0.0;                                     // logarithm of the odds that it is no longer displaced
-  Eigen::Vector3d first_off_ = Eigen::Vector3d::Zero();   // innovation of the first of them
-  Eigen::Vector3d newest_off_ = Eigen::Vector3d::Zero();  // of the newest rejected one
+  RejectedRun run_;
+  int64_t displaced_since_us_ = 0;
+  double back_ = 0.0;  // logarithm of the odds that it is no longer displaced
   bool height_displaced_ = false;
   ErrorTime error_time_;                           // of code receivers
   Eigen::Vector2d way_ = Eigen::Vector2d::Zero();  // m, gone without what fixes have corrected
