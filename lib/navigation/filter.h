@@ -50,6 +50,10 @@ class Filter {
 
   /// Watches for steps from now on, (N.5.8).
   void watch_for_steps() { steps_.begin(state_, motion()); }
+  /// What has come since is explained; as of StepDetector::begin_after.
+  void watch_for_steps_after(int64_t t_us) {
+    steps_.begin_after(state_, motion(), seconds_between(t_us, state_.x.t_us));
+  }
   /// The step that explains the innovations better than chance does at this many sigmas; the rest as of StepDetector.
   std::optional<StepDetector::Step> likely_step(double sigmas, bool displaced, bool receiver_waits);
   void take_back(const StepDetector::Step& step);

@@ -87,7 +87,7 @@ StepDetector::StepDetector(const VehicleFacts& v) {
 
 void StepDetector::begin(State& state, const BodyMotion& motion) {
   if (state.carried().cols() != kColumns) state.carry(kColumns);
-  for (int m = 0; m <= kMoments; ++m) begin(state, motion, m);
+  for (int m = kMoments; m >= 0; --m) begin(state, motion, m);  // of the start first, which the others note
   next_us_ = 0;
   usual_ = 1.0;
   fresh_ = false;
@@ -96,7 +96,7 @@ void StepDetector::begin(State& state, const BodyMotion& motion) {
 
 /// An imu's clock that is set forward by d leaves a gap of d in its stamps, over which the state is moved once too often, and
 /// one that is set back leaves out as much, (N.5.9).
-void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
+void StepDetector::begin_columns(State& state, const BodyMotion& motion, int moment) const {
   auto columns = state.carried().middleCols(first(moment), width(moment));
   columns.setZero();
   if (moment == kStart) {  // positions were taken from that antenna, and so are the estimate's
@@ -116,9 +116,32 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
     columns(kPositionLatency, kReceiverClock) = columns(kVelocityLatency, kReceiverClock) = 1.0;
     columns(kWheelLatency, kWheelClock) = 1.0;
   }
+}
+
+void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
+  begin_columns(state, motion, moment);
   information_[static_cast<size_t>(moment)].setZero();
   sum_.col(moment).setZero();
   age_(moment) = squares_(moment) = count_(moment) = 0.0;
+  if (moment < kStart)
+    before_[static_cast<size_t>(moment)] = {information_[kStart].topLeftCorner<kAntennaSize, kAntennaSize>(),
+                                            sum_.col(kStart).head<kAntennaSize>(), squares_(kStart), count_(kStart)};
+}
+
+void StepDetector::begin_after(State& state, const BodyMotion& motion, double seconds) {
+  OfAntenna known;
+  double age = kMemory + kMemory;  // of the youngest moment before that
+  for (int m = 0; m < kStart; ++m)
+    if (age_(m) >= seconds && age_(m) < age) {
+      age = age_(m);
+      known = before_[static_cast<size_t>(m)];
+    }
+  begin(state, motion);
+  information_[kStart].topLeftCorner<kAntennaSize, kAntennaSize>() = known.information;
+  sum_.col(kStart).head<kAntennaSize>() = known.sum;
+  squares_(kStart) = known.squares;
+  count_(kStart) = known.count;
+  before_.fill(known);
 }
 
 void StepDetector::begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows) {
@@ -137,7 +160,8 @@ void StepDetector::begin_at_surprise(State& state, const BodyMotion& motion, dou
 void StepDetector::advance(State& state, const BodyMotion& motion, bool displaced) {
   const int64_t t_us = state.x.t_us;
   if (!watches_ || t_us < next_us_) return;
-  if (displaced) begin(state, motion, kStart);
+  displaced_ = displaced;
+  if (displaced) begin_columns(state, motion, kStart);
   next_us_ = t_us + kApart_us;
   ++turn_;
   begin(state, motion, kRing + turn_ % (kMoments - kRing));
@@ -184,7 +208,7 @@ void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen
   // Robust weight, as of Huber's estimator: single outliers decide nothing, those that agree with each other do.
   const double square = whitened.squaredNorm(), rows = static_cast<double>(whitened.size());
   const double weight = std::min(1.0, kMostSquare * rows / square);
-  for (int m = 0; m <= (antenna ? kStart : kStart - 1); ++m) {
+  for (int m = 0; m <= (antenna && !displaced_ ? kStart : kStart - 1); ++m) {
     const int n = width(m);
     const auto g = G.middleCols(first(m), n);
     information_[static_cast<size_t>(m)].topLeftCorner(n, n) += weight * g.transpose().lazyProduct(g);
@@ -257,7 +281,8 @@ void StepDetector::take_back(const Step& step, State& state, const BodyMotion& m
   last.head(n) += made;
   last_kind_ = step.kind;
   last_us_ = step.kind == StepKind::kReceiver || step.kind == StepKind::kLeverArm ? 0 : state.x.t_us;
-  begin(state, motion);
+  if (step.kind == StepKind::kLeverArm) return begin(state, motion);
+  begin_after(state, motion, age_(moment_of(step.column)));
 }
 
 }  // namespace roadfix::navigation

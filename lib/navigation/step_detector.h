@@ -46,6 +46,10 @@ class StepDetector {
   static constexpr int first(int moment) {
     return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
   }
+  static constexpr int moment_of(int column) {
+    const int recent = column / kWidth, scale = kRecent + column - kRecent * kWidth;
+    return recent < kRecent ? recent : scale < kStart ? scale : kStart;
+  }
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
   using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
@@ -61,6 +65,8 @@ class StepDetector {
 
   /// Watches from now on.
   void begin(State& state, const BodyMotion& motion);
+  /// What came in the last `seconds` is explained: watches anew, and knows of the antenna's place what it knew before.
+  void begin_after(State& state, const BodyMotion& motion, double seconds);
   void stop() { watches_ = false; }
   [[nodiscard]] bool watches() const { return watches_; }
   /// Often: the oldest moments are replaced by now. `displaced`: the receiver is known to be, and what it says
@@ -101,7 +107,8 @@ class StepDetector {
   /// show yet, and its steps wait.
   [[nodiscard]] std::optional<Step> most_likely(double sigmas, bool displaced, bool receiver_waits) const;
   /// Takes `step` back: what it has made of all errors goes out of the means, how well it is known into the covariance, whose
-  /// epoch is the state's; the one before is doubted where it was of another kind, (N.5.11). Watches anew.
+  /// epoch is the state's; the one before is doubted where it was of another kind, (N.5.11). Watches anew, but what was known
+  /// of the antenna's place before the step is known still.
   void take_back(const Step& step, State& state, const BodyMotion& motion);
 
   /// Evidence has come since the last call.
@@ -109,9 +116,10 @@ class StepDetector {
 
   template <class Archive>
   void serialise(Archive& a) {
-    a(watches_, fresh_, next_us_, turn_, latest_, surprised_us_, surprise_, usual_, age_, sum_, squares_, count_,
-      last_kind_, last_us_);
+    a(watches_, fresh_, displaced_, next_us_, turn_, latest_, surprised_us_, surprise_, usual_, age_, sum_, squares_,
+      count_, last_kind_, last_us_);
     for (int m = 0; m <= kMoments; ++m) serialise(a, information_[static_cast<size_t>(m)], width(m));
+    for (OfAntenna& b : before_) a(b.information, b.sum, b.squares, b.count);
   }
 
  private:
@@ -134,6 +142,13 @@ class StepDetector {
     Step step;                ///< of the moment that explains most
   };
   void begin(State& state, const BodyMotion& motion, int moment);
+  void begin_columns(State& state, const BodyMotion& motion, int moment) const;
+  /// Evidence on the antenna's place.
+  struct OfAntenna {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double squares = 0.0, count = 0.0;
+  };
   [[nodiscard]] Fit best_of(size_t block) const;
   [[nodiscard]] bool carries(int moment, int at, int size) const;
 
@@ -141,6 +156,7 @@ class StepDetector {
   Eigen::Matrix<double, kWidth + kAntennaSize, 1> typical_;
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
   bool watches_ = false, fresh_ = false;
+  bool displaced_ = false;  ///< the receiver is known to be
   int64_t next_us_ = 0;
   int turn_ = 0, latest_ = 0;  ///< latest_: of the two surprises
   int64_t surprised_us_ = 0;
@@ -157,6 +173,7 @@ class StepDetector {
   /// By moment: s since; of the innovations beyond their number; evidence.
   using ByMoment = Eigen::Matrix<double, kMoments + 1, 1>;
   ByMoment age_ = ByMoment::Zero(), squares_ = ByMoment::Zero(), count_ = ByMoment::Zero();
+  std::array<OfAntenna, kMoments> before_;  ///< as it was when the moment began
 };
 
 }  // namespace roadfix::navigation

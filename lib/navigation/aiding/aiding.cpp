@@ -113,7 +113,6 @@ bool Aiding::mend_step(Filter& filter, bool frozen) {
   if (!step) return false;
   if (step->kind == StepKind::kReceiver && gnss_position_.rejects()) {
     gnss_position_.displace(filter);
-    filter.watch_for_steps();
     return false;
   }
   filter.take_back(*step);

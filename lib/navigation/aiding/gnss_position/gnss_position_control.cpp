@@ -99,6 +99,7 @@ bool GnssPositionControl::waits(int64_t t_us) const {
 void GnssPositionControl::displace(Filter& filter) {
   set_displaced(filter.state().x.t_us);
   widen_bias(filter, run_.newest_off());
+  filter.watch_for_steps_after(run_.since_us());
 }
 
 bool GnssPositionControl::after_outage(int64_t t_us) const {
@@ -353,7 +354,7 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
   if (run_.agreeing() < (filter_is_wrong ? kRunForFilter : kRunForReceiver)) return r;
   if (!filter_is_wrong) {
     set_displaced(fix.t_us);
-    filter.watch_for_steps();  // what the run was evidence of is decided
+    filter.watch_for_steps_after(run_.since_us());
   }
   set_bias(filter, bias);
   const Bias now = bias.begun();
