@@ -130,7 +130,7 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
 
 void StepDetector::begin_after(State& state, const BodyMotion& motion, double seconds) {
   OfAntenna known;
-  double age = kMemory + kMemory;  // of the youngest moment before that
+  double age = 2.0 * kMemory;  // of the youngest moment before that
   for (int m = 0; m < kStart; ++m)
     if (age_(m) >= seconds && age_(m) < age) {
       age = age_(m);
@@ -233,7 +233,7 @@ StepDetector::Fit StepDetector::best_of(size_t block) const {
     const Posterior p(information_[static_cast<size_t>(m)].block(column, column, b.size, b.size) / usual,
                       sum_.col(m).segment(column, b.size) / usual, typical_.segment(b.first, b.size), b.any_size);
     if (p.explained * usual < kMostOfIt * squares_(m) || p.log_odds <= best.likelihood) continue;
-    best = {p.log_odds, {b.kind, p.log_odds - b.rarity, first(m) + column, p.mean, p.cov}};
+    best = {p.log_odds, {b.kind, p.log_odds - b.rarity, age_(m), first(m) + column, p.mean, p.cov}};
   }
   best.step.log_odds = best.likelihood - b.rarity;
   return best;
@@ -282,7 +282,7 @@ void StepDetector::take_back(const Step& step, State& state, const BodyMotion& m
   last_kind_ = step.kind;
   last_us_ = step.kind == StepKind::kReceiver || step.kind == StepKind::kLeverArm ? 0 : state.x.t_us;
   if (step.kind == StepKind::kLeverArm) return begin(state, motion);
-  begin_after(state, motion, age_(moment_of(step.column)));
+  begin_after(state, motion, step.age);
 }
 
 }  // namespace roadfix::navigation

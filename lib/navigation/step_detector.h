@@ -46,16 +46,13 @@ class StepDetector {
   static constexpr int first(int moment) {
     return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
   }
-  static constexpr int moment_of(int column) {
-    const int recent = column / kWidth, scale = kRecent + column - kRecent * kWidth;
-    return recent < kRecent ? recent : scale < kStart ? scale : kStart;
-  }
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
   using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
   struct Step {
     StepKind kind = StepKind::kWheels;
     double log_odds = 0.0;  ///< against none
+    double age = 0.0;       ///< s since it happened
     int column = 0;         ///< first of the carried columns: errors of the filter now per unit of the step
     SmallVector size;       ///< in the units of the columns
     Small cov;
