@@ -44,6 +44,7 @@ void Filter::adopt(const Filter& other, const CameraFacts& camera) {
     std.segment<3>(kLens) = Eigen::Vector3d(camera.focal_std, camera.radial_std, camera.radial4_std);
   }
   std(kCameraOffset) = camera.offset_std;
+  std.segment<3>(kTrackDrift).setConstant(tuning_.drift);
   adopt(other, mean, std);
 }
 
@@ -111,6 +112,10 @@ void Filter::flush() {
   P.block(0, 9, 9, n - 9) = rows.rightCols(n - 9);
   P.block(9, 0, n - 9, 9) = rows.rightCols(n - 9).transpose();
   P.diagonal().head<kWithoutCamera>() += d.noise;
+  if (state_.has_camera()) {
+    const double decay = inertial::gauss_markov_decay(T * state_.x.nav.velocity.norm(), tuning_.drift_way);
+    state_.decay_track_drift(decay, (1.0 - decay * decay) * tuning_.drift * tuning_.drift);
+  }
   propagation_.restart_sums();
 }
 

@@ -38,6 +38,7 @@ void retract_base(Mean& x, const Eigen::Ref<const Eigen::VectorXd>& d, const Eig
   x.T_left_right.q = (x.T_left_right.q * exp_q(part(d, kRightTurn))).normalized();
   x.lens += part(d, kLens);
   x.camera_offset += d(kCameraOffset);
+  x.track_drift += part(d, kTrackDrift);
 }
 
 }  // namespace
@@ -83,6 +84,7 @@ BaseVector local(const Mean& x, const Mean& y, const Eigen::Vector3d& p_ref) {
   d.segment<3>(kRightTurn) = log_q(x.T_left_right.q.conjugate() * y.T_left_right.q);
   d.segment<3>(kLens) = y.lens - x.lens;
   d(kCameraOffset) = y.camera_offset - x.camera_offset;
+  d.segment<3>(kTrackDrift) = y.track_drift - x.track_drift;
   return d;
 }
 
@@ -122,6 +124,7 @@ void State::adopt(const State& other, const Mean& camera, const BaseVector& vari
   mean.T_left_right = camera.T_left_right;
   mean.lens = camera.lens;
   mean.camera_offset = camera.camera_offset;
+  mean.track_drift = camera.track_drift;
   reset(mean, variance);
   p_ref = other.p_ref;
   P_.topLeftCorner<kWithoutCamera, kWithoutCamera>() = other.P_.topLeftCorner<kWithoutCamera, kWithoutCamera>();
@@ -139,6 +142,15 @@ void State::correct(const Eigen::Ref<const Eigen::VectorXd>& d) {
   } else {
     retract(d);
   }
+}
+
+void State::decay_track_drift(double decay, double variance) {
+  x.track_drift *= decay;
+  P_.middleRows<3>(kTrackDrift).leftCols(size_) *= decay;
+  P_.middleCols<3>(kTrackDrift).topRows(size_) *= decay;
+  P_.diagonal().segment<3>(kTrackDrift).array() += variance;
+  expected_.segment<3>(kTrackDrift) *= decay;
+  carried_.middleRows<3>(kTrackDrift) *= decay;
 }
 
 void State::hold(const BaseVector& base) {

@@ -46,8 +46,9 @@ inline constexpr int kCameraTurn = 44;    ///< rad, of the left camera in the im
 inline constexpr int kCameraPlace = 47;   ///< m, imu axes
 inline constexpr int kLens = 50;          ///< of the left camera, (N.6.9)
 inline constexpr int kRightTurn = 53;     ///< rad, of the right camera against the left one, right camera's axes
-inline constexpr int kCameraOffset = 56;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
-inline constexpr int kBaseSize = 57;
+inline constexpr int kTrackDrift = 56;    ///< rad/m, camera axes: a slow turn that all tracks pretend, (N.6.20)
+inline constexpr int kCameraOffset = 59;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
+inline constexpr int kBaseSize = 60;
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxPoints;
 
 using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
@@ -75,6 +76,7 @@ struct Mean {
   SE3 T_left_right;  ///< right camera's coordinates to the left one's; the place is exact
   Eigen::Vector3d lens = Eigen::Vector3d::Zero();
   double camera_offset = 0.0;
+  Eigen::Vector3d track_drift = Eigen::Vector3d::Zero();
 
   [[nodiscard]] Eigen::Matrix3d R() const { return nav.q_level_imu.toRotationMatrix(); }
   /// Sensor readings with the estimated errors taken out, (N.2.1).
@@ -86,7 +88,7 @@ struct Mean {
     a(t_us, nav.q_level_imu.coeffs(), nav.velocity, nav.position, gyro_bias, accel_bias, gyro_scale, accel_scale,
       wheel_scale, mounting, p_imu_axle, p_imu_antenna, position_latency, velocity_latency, imu_offset, wheel_latency,
       gnss_bias, gnss_velocity_bias, gnss_return, return_rate, T_imu_camera.q.coeffs(), T_imu_camera.p,
-      T_left_right.q.coeffs(), T_left_right.p, lens, camera_offset);
+      T_left_right.q.coeffs(), T_left_right.p, lens, camera_offset, track_drift);
   }
 };
 
@@ -158,6 +160,9 @@ class State {
   void carry(int columns) { carried_ = Eigen::MatrixXd::Zero(P_.rows(), columns); }
   [[nodiscard]] const Eigen::MatrixXd& carried() const { return carried_; }
   [[nodiscard]] Eigen::MatrixXd& carried() { return carried_; }
+
+  /// Mean and error of what tracks pretend times `decay`, and variance added to each axis, (N.6.20).
+  void decay_track_drift(double decay, double variance);
 
   /// P -= Y Y', Y with size() rows, symmetric to the bit.
   void subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y);

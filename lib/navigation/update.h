@@ -69,7 +69,7 @@ class Columns {
   struct Block {
     int at = 0, width = 0;  ///< in the state
   };
-  static constexpr int kCamera = 12;  ///< turn, place, lens, right eye's turn
+  static constexpr int kCamera = 15;  ///< turn, place, lens, right eye's turn, drift
   static constexpr int kMost = kCamera + 6 * kMaxClones;
 
   explicit Columns(const State& state);

@@ -44,6 +44,7 @@ class RandomNavigationState {
     x.T_left_right = {exp_q(vector(0.1)), {0.5, 0.0, 0.0}};
     x.lens = vector(0.01);
     x.camera_offset = number(0.02);
+    x.track_drift = vector(1e-3);
     return x;
   }
 

@@ -234,9 +234,14 @@ void CameraControl::choose_tracks(const State& state, bool full) {
 
 void CameraControl::try_tracks(const State& state, const State* course) {
   const Mean& x = state.x;
-  window_.camera = {x.T_imu_camera, x.lens, x.T_left_right};
+  window_.camera = {x.T_imu_camera, x.lens, x.T_left_right, x.track_drift};
   window_.views.clear();
-  for (const Clone& c : state.clones) window_.views.push_back({c.R, c.p - state.p_ref});
+  double way = 0.0;
+  for (const Clone& c : state.clones) {
+    const Eigen::Vector3d p = c.p - state.p_ref;
+    if (!window_.views.empty()) way += (p - window_.views.back().p).norm();
+    window_.views.push_back({c.R, p, way});
+  }
   const Columns columns(state);
   columns_of(state, columns, window_.P);
   window_.P_course.resize(0, 0);

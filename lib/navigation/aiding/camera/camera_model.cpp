@@ -40,13 +40,19 @@ double guess_inverse_depth(const Eyes& eyes, const Eigen::Vector2d& ray) {
   return bb > 0.0 ? -ab / bb : 0.0;
 }
 
+/// From the left eye's axes to those that the tracks pretend, (N.6.20).
+Eigen::Matrix3d pretended_turn(const CameraGeometry& camera, const ViewPose& anchor, const ViewPose& view) {
+  return exp_so3(-(view.way - anchor.way) * camera.drift);
+}
+
 }  // namespace
 
 RelativeView left_view(const CameraGeometry& camera, const ViewPose& anchor, const ViewPose& view) {
   const Eigen::Matrix3d C = camera.T_imu_camera.R();
   const Eigen::Vector3d& t = camera.T_imu_camera.p;
-  const Eigen::Matrix3d A = C.transpose() * view.R.transpose();
-  return {A * anchor.R * C, A * (anchor.R * t + anchor.p - view.p) - C.transpose() * t};
+  const Eigen::Matrix3d D = pretended_turn(camera, anchor, view) * C.transpose();
+  const Eigen::Matrix3d A = D * view.R.transpose();
+  return {A * anchor.R * C, A * (anchor.R * t + anchor.p - view.p) - D * t};
 }
 
 RelativeView right_view(const CameraGeometry& camera, const RelativeView& left) {
@@ -58,14 +64,18 @@ DirectionJacobian direction_jacobian(const CameraGeometry& camera, const ViewPos
                                      const RelativeView& left, const Eigen::Vector3d& f) {
   const Eigen::Matrix3d C = camera.T_imu_camera.R();
   const Eigen::Vector3d& t = camera.T_imu_camera.p;
-  const Eigen::Matrix3d A = C.transpose() * view.R.transpose();
+  const Eigen::Matrix3d turned = pretended_turn(camera, anchor, view), D = turned * C.transpose();
+  const Eigen::Matrix3d A = D * view.R.transpose();
   const Eigen::Vector3d m(f.x(), f.y(), 1.0);
   const Eigen::Vector3d u = anchor.R * (C * m + f.z() * t) + f.z() * anchor.p;
   DirectionJacobian J;
   J.anchor_turn = -A * skew(u);
   J.anchor_place = f.z() * A;
-  J.camera_turn = skew(left.direction(f)) - left.B * skew(m);
-  J.camera_place = f.z() * (A * anchor.R - C.transpose());
+  const Eigen::Matrix3d by_turn = skew(left.direction(f));
+  J.camera_turn = by_turn * turned - left.B * skew(m);
+  J.camera_place = f.z() * (A * anchor.R - D);
+  const double way = view.way - anchor.way;
+  J.drift = way * by_turn * right_jacobian(way * camera.drift);
   return J;
 }
 

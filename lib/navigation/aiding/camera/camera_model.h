@@ -22,6 +22,7 @@ inline constexpr int kMaxViews = 17;
 struct ViewPose {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< imu to frame
   Eigen::Vector3d p = Eigen::Vector3d::Zero();      ///< m, from the point of reference, frame axes
+  double way = 0.0;                                 ///< m, length of the window's way up to here
 };
 
 /// What is estimated of the camera.
@@ -29,6 +30,8 @@ struct CameraGeometry {
   SE3 T_imu_camera;                                ///< of the left eye
   Eigen::Vector3d lens = Eigen::Vector3d::Zero();  ///< c_f, c_r, c_q of (N.6.9)
   SE3 T_left_right;                                ///< right eye's coordinates to the left one's
+  /// rad/m, left eye's axes: by how much the tracks of a view pretend that the camera turned since their anchor, (N.6.20)
+  Eigen::Vector3d drift = Eigen::Vector3d::Zero();
 };
 
 /// A point as one picture shows it: normalised coordinates, distortion taken out.
@@ -71,6 +74,7 @@ struct DirectionJacobian {
   Eigen::Matrix3d anchor_place;  ///< rho of the anchor
   Eigen::Matrix3d camera_turn;
   Eigen::Matrix3d camera_place;
+  Eigen::Matrix3d drift;
 };
 DirectionJacobian direction_jacobian(const CameraGeometry& camera, const ViewPose& anchor, const ViewPose& view,
                                      const RelativeView& left, const Eigen::Vector3d& f);

@@ -18,6 +18,8 @@ struct CameraTuning {
   /// rad and m, of the camera's mounting, whatever the calibration claims: a bracket that was knocked is off by two
   /// degrees, and a prior that is a little too wide costs nothing, as the fixes show the rest in seconds (N.6.15).
   double turn_floor = 0.009, place_floor = 0.02;
+  double drift = 5e-6;       ///< rad/m, standard deviation of a turn that all tracks pretend, (N.6.20)
+  double drift_way = 400.0;  ///< m, over which it becomes another one
   TrackTuning tracks;
 };
 
@@ -44,6 +46,8 @@ void visit(CameraTuning& c, Visitor& v) {
   v.number("iterate_above", c.iterate_above, 1.0, 1e9);
   v.number("turn_floor_rad", c.turn_floor, 0.0, 3.2);
   v.number("place_floor_m", c.place_floor, 0.0, 10.0);
+  v.number("drift_radpm", c.drift, 0.0, 1.0);
+  v.number("drift_way_m", c.drift_way, 1.0, 1e9);
   v.group("tracks", c.tracks);
 }
 

@@ -23,6 +23,7 @@ void put_rows(const RelativeView& view, const Eigen::Matrix3d& turn, const Direc
   rows.leftCols<3>() = by_h * view.by_point();
   rows.middleCols<3>(3 + Columns::kTurn) = by_left * J.camera_turn;
   rows.middleCols<3>(3 + Columns::kPlace) = by_left * J.camera_place;
+  rows.middleCols<3>(3 + Columns::kDrift) = by_left * J.drift;
   rows.middleCols<3>(anchor) += by_left * J.anchor_turn;
   rows.middleCols<3>(anchor + 3) += by_left * J.anchor_place;
   rows.middleCols<3>(own) -= by_left * J.anchor_turn;

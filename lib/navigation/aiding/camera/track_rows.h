@@ -8,8 +8,8 @@ namespace roadfix::navigation {
 
 /// Columns of the errors that rows depend on: the camera's, then each view's (phi, rho).
 struct TrackColumns {
-  static constexpr int kTurn = 0, kPlace = 3, kLens = 6, kRightTurn = 9;
-  static constexpr int kCamera = 12;
+  static constexpr int kTurn = 0, kPlace = 3, kLens = 6, kRightTurn = 9, kDrift = 12;
+  static constexpr int kCamera = 15;
   static constexpr int kMost = kCamera + 6 * kMaxViews;
   static constexpr int of_view(int view) { return kCamera + 6 * view; }
 };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 
 #include "geometry/so3.h"
 #include "navigation/aiding/camera/camera_control.h"
@@ -17,6 +18,7 @@ struct CameraRun {
   double sigma_px = 0.1, walk_px = 0.15, right_sigma_px = 0.2;  ///< what the filter is told of the tracks
   double velocity_std = 0.05, tilt_std = 2e-3, yaw_std = 1e-2;
   double camera_turn_std = 0.0;  ///< rad
+  double drift = 0.0;            ///< rad/m, about each camera axis: a turn that all tracks pretend
   navigation::CameraTuning tuning;
   std::function<void(TrackPicture&)> spoil = {};     ///< what happens to a picture before it comes
   std::function<void(navigation::Mean&)> tell = {};  ///< what the calibration says wrong
@@ -62,6 +64,29 @@ inline TrackPicture picture_of(const TrackFrame& frame, const CameraRun& run) {
   return p;
 }
 
+/// Moves tracks as if the camera had turned since each of them was first seen.
+class PretendedTurn {
+ public:
+  PretendedTurn(const Camera& camera, double drift) : camera_(camera), drift_(drift) {}
+  /// `way`: m since the last picture.
+  void operator()(TrackPicture& picture, double way) {
+    way_ += way;
+    for (TrackSighting& s : picture.tracks) {
+      const double since = way_ - first_seen_.try_emplace(s.track, way_).first->second;
+      const auto seen = camera_.unproject(s.left);
+      if (!seen) continue;
+      const Eigen::Vector3d turned = exp_so3(Eigen::Vector3d::Constant(-since * drift_)) * seen->homogeneous();
+      s.left = camera_.distort(turned.hnormalized()).value_or(s.left);
+    }
+  }
+
+ private:
+  const Camera& camera_;
+  double drift_;
+  double way_ = 0.0;
+  std::map<int64_t, double> first_seen_;
+};
+
 inline navigation::NavigationConfig facts_of(const TrackDrive& d) {
   navigation::NavigationConfig c;
   const ImuConfig& imu = d.drive.config.imu;
@@ -85,6 +110,7 @@ inline navigation::BaseVector start_std(const CameraRun& run, const navigation::
   std.segment<3>(kGyroScale).setConstant(facts.scale_std);
   std.segment<3>(kAccelScale).setConstant(facts.scale_std);
   std.segment<3>(kCameraTurn).setConstant(run.camera_turn_std);
+  std.segment<3>(kTrackDrift).setConstant(run.tuning.drift);
   if (!run.two_eyes) std.segment<3>(kLens) = Eigen::Vector3d(0.01, 0.02, 0.05);
   return std;
 }
@@ -106,6 +132,8 @@ inline CameraOutcome drive_by_camera(const TrackDrive& d, const CameraRun& run, 
   CameraControl camera(run.tuning, facts);
   const int64_t begin_us = d.drive.imu.front().t_us + static_cast<int64_t>(1e6 * run.begin_s);
   const int64_t end_us = d.drive.imu.front().t_us + static_cast<int64_t>(1e6 * run.end_s);
+  PretendedTurn pretend(d.rig.camera, run.drift);
+  Eigen::Vector3d seen_from = d.drive.truth_at(begin_us).T_frame_vehicle.p;
   CameraOutcome out;
   int64_t last_us = 0;
   bool begun = false;
@@ -136,6 +164,9 @@ inline CameraOutcome drive_by_camera(const TrackDrive& d, const CameraRun& run, 
       }
     } else if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && begun && run.camera) {
       TrackPicture picture = picture_of(*frame, run);
+      const Eigen::Vector3d place = d.truth(*frame).T_frame_vehicle.p;
+      if (run.drift != 0.0) pretend(picture, (place - seen_from).norm());
+      seen_from = place;
       if (run.spoil) run.spoil(picture);
       camera.add(picture);
     }

@@ -34,9 +34,11 @@ inline TrackWindow window_along(int views, double step, double turn, const Eigen
   w.camera.T_left_right = {exp_q(draw(random, 0.01)), Eigen::Vector3d(0.5, 0.0, 0.0) + draw(random, 0.01)};
   w.two_eyes = true;
   Eigen::Vector3d p = from;
+  double way = 0.0;
   for (int i = 0; i < views; ++i) {
     const double heading = 0.3 + turn * i;
-    w.views.push_back({exp_so3({0.0, 0.0, heading}) * exp_so3(draw(random, 0.02)), p + draw(random, 0.02)});
+    w.views.push_back({exp_so3({0.0, 0.0, heading}) * exp_so3(draw(random, 0.02)), p + draw(random, 0.02), way});
+    way += step;
     p += step * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
   }
   w.P = Eigen::MatrixXd::Zero(w.columns(), w.columns());
@@ -61,7 +63,8 @@ inline Eigen::Vector2d bent(const CameraGeometry& camera, const Eigen::Vector2d&
 inline ViewSighting sighting(const CameraGeometry& camera, const ViewPose& view, int i, const Eigen::Vector3d& point,
                              bool two_eyes, double px) {
   const Eigen::Vector3d in_imu = view.R.transpose() * (point - view.p);
-  const Eigen::Vector3d left = camera.T_imu_camera.R().transpose() * (in_imu - camera.T_imu_camera.p);
+  const Eigen::Matrix3d pretended = exp_so3(-view.way * camera.drift);
+  const Eigen::Vector3d left = pretended * camera.T_imu_camera.R().transpose() * (in_imu - camera.T_imu_camera.p);
   ViewSighting s;
   s.view = i;
   s.left = {bent(camera, left.hnormalized()), px};
@@ -86,6 +89,7 @@ inline TrackWindow moved(const TrackWindow& w, const Eigen::VectorXd& d) {
   m.camera.T_imu_camera.q = w.camera.T_imu_camera.q * exp_q(d.segment<3>(TrackColumns::kTurn));
   m.camera.T_imu_camera.p += d.segment<3>(TrackColumns::kPlace);
   m.camera.lens += d.segment<3>(TrackColumns::kLens);
+  m.camera.drift += d.segment<3>(TrackColumns::kDrift);
   m.camera.T_left_right.q = w.camera.T_left_right.q * exp_q(d.segment<3>(TrackColumns::kRightTurn));
   for (size_t i = 0; i < w.views.size(); ++i) {
     const auto at = TrackColumns::of_view(static_cast<int>(i));

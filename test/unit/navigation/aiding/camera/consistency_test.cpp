@@ -73,6 +73,19 @@ TEST_CASE("camera and imu claim what they are worth on tracks whose errors walk"
   CHECK(white.all.ratio() > 1.6);
 }
 
+TEST_CASE("a slow turn that all tracks pretend does not pass for the camera's own") {
+  CameraRun run;
+  run.drift = 1.5e-5;  // that of drawn pictures, about every axis
+  run.tuning.drift = 1.5e-5;
+  const Claims modelled = claims(8, run);
+  print("drift, modelled", modelled);
+  CHECK(modelled.attitude.ratio() < 1.4);
+  run.tuning.drift = 0.0;
+  const Claims ignored = claims(8, run);
+  print("drift, ignored", ignored);
+  CHECK(ignored.attitude.ratio() > 1.7);
+}
+
 namespace {
 
 struct Faulty {

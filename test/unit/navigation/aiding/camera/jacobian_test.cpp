@@ -28,7 +28,10 @@ Case make_case(int number) {
   RandomStream random(static_cast<uint64_t>(number) + 1, 0x3A11);
   const Eigen::Vector3d from = number == 0 ? Eigen::Vector3d::Zero() : draw(random, 300.0);
   Case c{window_along(4, 0.8, 0.05, from, static_cast<uint64_t>(number) + 1), {}, {}, {}};
-  if (number > 0) c.window.camera.lens = 0.03 * draw(random, 1.0);
+  if (number > 0) {
+    c.window.camera.lens = 0.03 * draw(random, 1.0);
+    c.window.camera.drift = draw(random, 1e-3);
+  }
   c.point = point_at(c.window, {0.2 * random.normal(), 0.1 * random.normal()}, 8.0 + 10.0 * random.uniform());
   c.seen = straight(c.window, sightings(c.window, c.point, true));
   const auto f = triangulate(c.window.camera, c.window.views, c.seen, 0, true, 0.5, 0.5);
@@ -68,7 +71,7 @@ Eigen::MatrixXd numeric_rows(const Case& c) {
 
 }  // namespace
 
-TEST_CASE("camera rows have right derivatives by point, camera, lens, right eye and poses") {
+TEST_CASE("camera rows have right derivatives by point, camera, lens, right eye, drift and poses") {
   for (int n = 0; n < kStates; ++n) {
     CAPTURE(n);
     const Case c = make_case(n);
@@ -82,6 +85,9 @@ TEST_CASE("camera rows have right derivatives by point, camera, lens, right eye 
     }
     Eigen::MatrixXd wrong = H;  // teeth: one block's sign
     wrong.middleCols<3>(3 + TrackColumns::kRightTurn) *= -1.0;
+    CHECK_FALSE((wrong - numeric).norm() <= kTolerance * (1.0 + H.norm()));
+    wrong = H;
+    wrong.middleCols<3>(3 + TrackColumns::kDrift).setZero();
     CHECK_FALSE((wrong - numeric).norm() <= kTolerance * (1.0 + H.norm()));
   }
 }
