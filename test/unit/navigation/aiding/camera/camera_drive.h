@@ -64,7 +64,7 @@ inline TrackPicture picture_of(const TrackFrame& frame, const CameraRun& run) {
   return p;
 }
 
-/// Moves tracks as if the camera had turned since each of them was first seen.
+/// Moves the left places of tracks as if the camera had turned since each of them was first seen.
 class PretendedTurn {
  public:
   PretendedTurn(const Camera& camera, double drift) : camera_(camera), drift_(drift) {}

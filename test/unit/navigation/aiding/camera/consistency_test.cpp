@@ -75,7 +75,7 @@ TEST_CASE("camera and imu claim what they are worth on tracks whose errors walk"
 
 TEST_CASE("a slow turn that all tracks pretend does not pass for the camera's own") {
   CameraRun run;
-  run.drift = 1.5e-5;  // that of drawn pictures, about every axis
+  run.drift = 1.5e-5;  // the roll that drawn pictures pretend, about every axis
   run.tuning.drift = 1.5e-5;
   const Claims modelled = claims(8, run);
   print("drift, modelled", modelled);
