@@ -101,6 +101,26 @@ TEST_CASE("updates and shrinking keep the covariance symmetric to the bit") {
   }
 }
 
+TEST_CASE("what tracks pretend decays in mean and correlations, and its variance settles") {
+  test::RandomNavigationState random(9);
+  State s = random_state(random, 3);
+  s.carry(2);
+  s.carried().setOnes();
+  constexpr double kDecay = 0.9, kSettled = 4e-6;
+  const Eigen::Vector3d mean = s.x.track_drift;
+  const Eigen::MatrixXd before = s.P().topLeftCorner(s.size(), s.size());
+  s.decay_track_drift(kDecay, (1.0 - kDecay * kDecay) * kSettled);
+  CHECK((s.x.track_drift - kDecay * mean).norm() < 1e-15);
+  CHECK(symmetric(s));
+  CHECK(s.P()(kTrackDrift, kPos) == Approx(kDecay * before(kTrackDrift, kPos)));
+  CHECK(s.P()(kTrackDrift, kTrackDrift + 1) == Approx(kDecay * kDecay * before(kTrackDrift, kTrackDrift + 1)));
+  CHECK(s.P()(kCameraOffset, kCameraOffset) == before(kCameraOffset, kCameraOffset));  // teeth: its neighbour stays
+  CHECK(s.carried()(kTrackDrift, 1) == kDecay);
+  CHECK(s.carried()(kCameraOffset, 1) == 1.0);
+  for (int i = 0; i < 300; ++i) s.decay_track_drift(kDecay, (1.0 - kDecay * kDecay) * kSettled);
+  CHECK(s.P()(kTrackDrift, kTrackDrift) == Approx(kSettled));
+}
+
 TEST_CASE("a snapshot restores the state to the bit, and a wrong size is refused") {
   test::RandomNavigationState random(6);
   State s = random_state(random, 3);
