@@ -165,7 +165,7 @@ std::vector<Feature> KeyframeTracker::add_keyframe(const CameraFrame& frame, con
     const SE3& T_map_before = map().last().T_map_camera;
     const SE3 T_before_now = T_map_before.inverse() * camera_.T_map_camera;
     camera_.covariance.propagate(T_map_before, T_before_now);
-    loops_.covariance().propagate(loops_.S_map_odom().rigid() * T_map_before, T_before_now);
+    loops_.propagate(T_map_before, T_before_now);
   }
   const NewKeyframe added =
       mapping_.add_keyframe(frame, camera_.T_map_camera, features, image.standstill, prior_.distance);
@@ -189,7 +189,7 @@ void KeyframeTracker::finish_adjustment() {
   tracks_.drop(adjusted->outliers);
   camera_.T_map_camera = map().last().T_map_camera;  // the previous frame was the last keyframe
   camera_.covariance.add(adjusted->cov_keyframe, adjusted->scale_drift);
-  loops_.covariance().add(rotated(adjusted->cov_keyframe, loops_.S_map_odom()), adjusted->scale_drift);
+  loops_.add(adjusted->cov_keyframe, adjusted->scale_drift);
 }
 
 void KeyframeTracker::measure_scale() {

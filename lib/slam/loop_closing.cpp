@@ -5,12 +5,14 @@
 
 #include "features/corners.h"
 #include "features/keypoints.h"
+#include "slam/pose_covariance.h"
 
 namespace roadfix {
 namespace {
 
-constexpr int64_t kPlaceEvery = 3;  ///< keyframes
-constexpr int kExtraCorners = 300;  ///< beside the tracks: another visit may have other tracks
+constexpr int64_t kPlaceEvery = 3;                         ///< keyframes
+constexpr int kExtraCorners = 300;                         ///< beside the tracks: another visit may have other tracks
+constexpr double kJumpSigma = 10.0, kJumpTurnSigma = 0.3;  // m, rad: where the odometry jumped
 
 /// Reachability of a place `away` metres from the last pose at `speed` within `unseen_s`: similar streets cause false
 /// recognitions that are geometrically consistent.
@@ -53,6 +55,7 @@ PlaceView LoopClosing::view(const cv::Mat& gray, std::span<const Feature> featur
   PlaceView view;
   view.T_odom_camera = T_map_camera;
   view.cov = covariance_.with_scales();
+  view.step = step_;
   const SE3 T_camera_map = T_map_camera.inverse();
   for (size_t row = 0; row < described.index.size(); ++row) {
     const size_t i = described.index[row];
@@ -68,13 +71,19 @@ PlaceView LoopClosing::view(const cv::Mat& gray, std::span<const Feature> featur
 }
 
 bool LoopClosing::add_keyframe(const cv::Mat& gray, std::span<const Feature> features, const LocalMap& map) {
+  if (!enabled_) return false;
   const Keyframe& keyframe = map.last();
-  if (!enabled_ || keyframe.id % kPlaceEvery != 0) return false;
-  const bool continuous = std::exchange(continuous_, true);
-  if (!places_.add_place(view(gray, features, map, keyframe.T_map_camera), continuous)) return false;
+  const bool jumped = !std::exchange(continuous_, true);
+  if (jumped) {
+    step_.pose.diagonal() << Eigen::Vector3d::Constant(kJumpSigma * kJumpSigma),
+        Eigen::Vector3d::Constant(kJumpTurnSigma * kJumpTurnSigma);
+  }
+  const bool store = jumped || keyframe.id % kPlaceEvery == 0;
+  const bool closed_loop = places_.add_view(view(gray, features, map, keyframe.T_map_camera), store);
+  if (store) step_ = {};
   // Includes the error shared with the place.
-  covariance_.start_at(closed(keyframe.T_map_camera), places_.cov_after_loop());
-  return true;
+  if (closed_loop) covariance_.start_at(closed(keyframe.T_map_camera), places_.cov_after_loop());
+  return closed_loop;
 }
 
 std::optional<SE3> LoopClosing::locate(const cv::Mat& gray, const LocalMap& map, const SE3& T_map_camera, double speed,
@@ -98,8 +107,25 @@ void LoopClosing::restart(const AccumulatedCovariance& covariance, bool same_map
   covariance_ = covariance;
 }
 
+void LoopClosing::propagate(const SE3& T_map_keyframe, const SE3& T_keyframe_next) {
+  covariance_.propagate(S_map_odom().rigid() * T_map_keyframe, T_keyframe_next);
+  step_.pose = transported(step_.pose, T_map_keyframe, T_keyframe_next);
+}
+
+void LoopClosing::add(const Matrix6d& keyframe, double scale_drift) {
+  covariance_.add(rotated(keyframe, S_map_odom()), scale_drift);
+  step_.pose += keyframe;
+  step_.scale += scale_drift;
+}
+
+void LoopClosing::move_map(const SE3& T_new_old) {
+  places_.move(first_place_, T_new_old);
+  step_.pose = rotated(step_.pose, {T_new_old.q, Eigen::Vector3d::Zero(), 1.0});
+}
+
 void LoopClosing::level(const LevellingRotation& levelling, const SE3& T_map_keyframe) {
   places_.rotate(levelling);
+  step_.pose = rotated(step_.pose, {levelling.transform().q, Eigen::Vector3d::Zero(), 1.0});
   covariance_.level(levelling, S_map_odom().rigid() * T_map_keyframe);
 }
 

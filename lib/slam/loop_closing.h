@@ -31,8 +31,13 @@ class LoopClosing {
   /// The pose is given from outside. `same_map`: the map continues there.
   void restart(const AccumulatedCovariance& covariance, bool same_map);
   /// Transforms this map's part of the trajectory.
-  void move_map(const SE3& T_new_old) { places_.move(first_place_, T_new_old); }
+  void move_map(const SE3& T_new_old);
   void level(const LevellingRotation& levelling, const SE3& T_map_keyframe);
+
+  /// From the last keyframe to the next.
+  void propagate(const SE3& T_map_keyframe, const SE3& T_keyframe_next);
+  /// What the newest keyframe adds, in the map's axes, and the variance of the logarithm of the scale.
+  void add(const Matrix6d& keyframe, double scale_drift);
 
   [[nodiscard]] AccumulatedCovariance& covariance() { return covariance_; }
   [[nodiscard]] const Sim3& S_map_odom() const { return places_.S_map_odom(); }
@@ -44,7 +49,8 @@ class LoopClosing {
 
   template <class Self, class Archive>
   static void members(Self& self, Archive& archive) {
-    archive(self.places_, self.covariance_, self.first_place_, self.continuous_, self.relocalised_);
+    archive(self.places_, self.covariance_, self.step_.pose, self.step_.scale, self.first_place_, self.continuous_,
+            self.relocalised_);
   }
 
  private:
@@ -56,6 +62,7 @@ class LoopClosing {
   Camera camera_;
   PlaceGraph places_;
   AccumulatedCovariance covariance_;  ///< of the pose with all loops closed
+  StepCovariance step_;               ///< since the last place
   int64_t first_place_ = 0;           ///< of this map
   bool continuous_ = false;           ///< no jump since the last place
   bool relocalised_ = false;          ///< the next map starts at a recognised place

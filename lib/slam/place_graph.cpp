@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "features/keypoints.h"
 #include "geometry/so3.h"
+#include "slam/pose_covariance.h"
 #include "slam/state_io.h"
 
 namespace roadfix {
@@ -21,21 +23,26 @@ constexpr int kMinInliers = 20;
 constexpr double kMinInlierShare = 0.4;
 constexpr int kMinScalePairs = 8;
 
-// Sigmas of odometry constraints, for the distribution of a loop's error; only their ratios matter. One percent of the
-// distance, and the rotation of half a pixel at 700 px of focal length.
-constexpr double kOdometryShare = 0.01;
-constexpr double kMinOdometrySigma = 0.01;         // m
-constexpr double kOdometryRotationSigma = 0.0007;  // rad
-constexpr double kScaleDrift = 0.003;              // per constraint
-constexpr double kJumpSigma = 10.0;                // m, where the odometry jumped
-constexpr double kJumpRotationSigma = 0.3;         // rad
-constexpr double kMinLoopRotationSigma = 0.003;    // rad, lower limit
-constexpr double kMinLoopPositionSigma = 0.05;     // m, lower limit
-constexpr double kLoopScaleSigma = 0.02;
-
 struct Pair {
   int view = 0, place = 0;
 };
+
+/// Smallest sigmas of a constraint.
+struct Floor {
+  double position, turn, scale;  ///< m, rad, relative
+};
+constexpr Floor kStepFloor{1e-3, 1e-5, 1e-5};
+constexpr Floor kLoopFloor{0.03, 0.001, 0.02};  ///< the known place's points are not exact
+
+Matrix7d whitening(const Matrix6d& cov, double scale_variance, const Floor& floor) {
+  Matrix7d all = Matrix7d::Zero();
+  all.topLeftCorner<6, 6>() = cov;
+  all(6, 6) = scale_variance;
+  Vector7d least;
+  least << Eigen::Vector3d::Constant(floor.position), Eigen::Vector3d::Constant(floor.turn), floor.scale;
+  all.diagonal() += least.cwiseAbs2();
+  return whitening_of(all);
+}
 
 /// Mutual nearest neighbours with ratio test.
 std::vector<Pair> match(const cv::Mat& view, const cv::Mat& place) {
@@ -122,6 +129,12 @@ void PlaceGraph::store_place(const PlaceView& view) {
   Place place;
   place.id = next_id_++;
   place.cov = view.cov;
+  if (loop_added_) {  // on the last place
+    place.cov = transported(places_.back().cov, places_.back().S_map_camera.rigid(),
+                            T_odom_last_.inverse() * view.T_odom_camera) +
+                rotated(view.step.pose, S_map_odom_);
+  }
+  T_odom_last_ = view.T_odom_camera;
   place.S_map_camera = S_map_odom_ * Sim3{view.T_odom_camera.q, view.T_odom_camera.p, 1.0};
   for (size_t i = 0; i < view.p_camera.size() && place.points.size() < kMaxPoints; ++i) {
     if (!view.p_camera[i]) continue;
@@ -161,37 +174,52 @@ void PlaceGraph::move(int64_t first, const SE3& T_odom_odom) {
   if (!places_.empty() && places_.back().id >= first) T_odom_last_ = T_odom_odom * T_odom_last_;
 }
 
-bool PlaceGraph::add_place(const PlaceView& view, bool continuous) {
+bool PlaceGraph::add_view(const PlaceView& view, bool store) {
   const auto found = recognise(view, next_id_ - kMinPlaceGap, config_.with_scale);
-  const int64_t id = next_id_;
-  if (!places_.empty()) {
-    PoseConstraint constraint;
-    constraint.a = static_cast<int>(id - 1);
-    constraint.b = static_cast<int>(id);
-    const SE3 T = T_odom_last_.inverse() * view.T_odom_camera;
-    constraint.S_a_b = {T.q, T.p, 1.0};
-    const double length = T.p.norm();
-    constraint.sigma << Eigen::Vector3d::Constant(continuous ? kMinOdometrySigma + kOdometryShare * length
-                                                             : kJumpSigma),
-        Eigen::Vector3d::Constant(continuous ? kOdometryRotationSigma : kJumpRotationSigma), kScaleDrift;
-    odometry_constraints_.push_back(constraint);
+  const int64_t known = found ? places_[found->place].id : -1;
+  if (store) {
+    if (!places_.empty()) add_step(view);
+    store_place(view);
   }
-  const std::optional<size_t> known = found ? std::optional(found->place) : std::nullopt;
-  const int64_t known_id = known ? places_[*known].id : -1;
-  store_place(view);
-  T_odom_last_ = view.T_odom_camera;
-  if (!known || known_id < places_.front().id) return false;
+  if (found && known >= places_.front().id) add_loop(known, *found, view, store);
+  if (!store || !std::exchange(loop_added_, false)) return false;
+  optimise_places();
+  ++num_loops_;
+  return true;
+}
 
-  const PoseSolution& s = found->solution;
-  PoseConstraint loop;
-  loop.a = static_cast<int>(known_id);
-  loop.b = static_cast<int>(id);
-  loop.S_a_b = {s.T_map_camera.q, s.T_map_camera.p, found->scale};
-  const double position_sigma = std::max(kMinLoopPositionSigma, std::sqrt(s.cov.topLeftCorner<3, 3>().trace()));
-  const double turn_sigma = std::max(kMinLoopRotationSigma, std::sqrt(s.cov.bottomRightCorner<3, 3>().trace()));
-  loop.sigma << Eigen::Vector3d::Constant(position_sigma), Eigen::Vector3d::Constant(turn_sigma), kLoopScaleSigma;
-  loops_.push_back(loop);
+void PlaceGraph::add_step(const PlaceView& view) {
+  const SE3 T = T_odom_last_.inverse() * view.T_odom_camera;
+  const Matrix6d cov = rotated(view.step.pose, {T_odom_last_.q.conjugate(), Eigen::Vector3d::Zero(), 1.0});
+  odometry_constraints_.push_back({static_cast<int>(next_id_ - 1),
+                                   static_cast<int>(next_id_),
+                                   {T.q, T.p, 1.0},
+                                   whitening(cov, view.step.scale, kStepFloor)});
+}
 
+/// On the last place: where the view is none, with the step back to it.
+void PlaceGraph::add_loop(int64_t known, const Recognition& found, const PlaceView& view, bool stored) {
+  const SE3& T_known_camera = found.solution.T_map_camera;
+  const SE3 T_camera_last = view.T_odom_camera.inverse() * T_odom_last_;
+  const SE3 T_known_last = T_known_camera * T_camera_last;
+  Matrix6d cov = found.solution.cov;
+  if (!stored) {
+    const Eigen::Quaterniond q_known_odom = T_known_camera.q * view.T_odom_camera.q.conjugate();
+    cov = transported(cov + rotated(view.step.pose, {q_known_odom, Eigen::Vector3d::Zero(), 1.0}), T_known_camera,
+                      T_camera_last);
+  }
+  loops_.push_back({static_cast<int>(known),
+                    static_cast<int>(places_.back().id),
+                    {T_known_last.q, T_known_last.p, found.scale},
+                    whitening(cov, 0.0, kLoopFloor)});
+  const Sim3& S_map_known = places_[static_cast<size_t>(known - places_.front().id)].S_map_camera;
+  const Matrix6d& cov_known = places_[static_cast<size_t>(known - places_.front().id)].cov;
+  places_.back().cov = transported(cov_known, S_map_known.rigid(), T_known_last) +
+                       rotated(cov, {S_map_known.q, Eigen::Vector3d::Zero(), 1.0});
+  loop_added_ = true;
+}
+
+void PlaceGraph::optimise_places() {
   std::vector<Sim3> nodes;
   for (const Place& place : places_) nodes.push_back(place.S_map_camera);
   std::vector<PoseConstraint> constraints(odometry_constraints_.begin(), odometry_constraints_.end());
@@ -202,17 +230,9 @@ bool PlaceGraph::add_place(const PlaceView& view, bool continuous) {
     constraint.a -= first;
     constraint.b -= first;
   }
-  (void)optimise(nodes, constraints, first_loop, config_.with_scale);
+  (void)optimise(nodes, constraints, first_loop);
   for (size_t i = 0; i < nodes.size(); ++i) places_[i].S_map_camera = nodes[i];
-  S_map_odom_ = nodes.back() * Sim3{view.T_odom_camera.q, view.T_odom_camera.p, 1.0}.inverse();
-  Matrix6d cov = s.cov;  // relative to the recognised place, whose covariance is added
-  const Eigen::Matrix3d R_map_place = places_[static_cast<size_t>(known_id - first)].S_map_camera.q.toRotationMatrix();
-  cov.topLeftCorner<3, 3>() = R_map_place * s.cov.topLeftCorner<3, 3>() * R_map_place.transpose();
-  cov.topRightCorner<3, 3>().setZero();
-  cov.bottomLeftCorner<3, 3>().setZero();
-  places_.back().cov = places_[static_cast<size_t>(known_id - first)].cov + cov;
-  ++num_loops_;
-  return true;
+  S_map_odom_ = nodes.back() * Sim3{T_odom_last_.q, T_odom_last_.p, 1.0}.inverse();
 }
 
 namespace {
@@ -232,7 +252,7 @@ void put_tie(const PoseConstraint& constraint, StateWriter& writer) {
   writer.put(constraint.a);
   writer.put(constraint.b);
   put_sim3(constraint.S_a_b, writer);
-  writer.put(constraint.sigma);
+  writer.put(constraint.whitening);
 }
 
 PoseConstraint get_tie(StateReader& reader) {
@@ -240,7 +260,7 @@ PoseConstraint get_tie(StateReader& reader) {
   reader.get(constraint.a);
   reader.get(constraint.b);
   get_sim3(constraint.S_a_b, reader);
-  reader.get(constraint.sigma);
+  reader.get(constraint.whitening);
   return constraint;
 }
 
@@ -249,6 +269,7 @@ PoseConstraint get_tie(StateReader& reader) {
 void PlaceGraph::save(StateWriter& writer) const {
   writer.put(next_id_);
   writer.put(num_loops_);
+  writer.put(loop_added_);
   put_pose(T_odom_last_, writer);
   put_sim3(S_map_odom_, writer);
   writer.put(static_cast<int64_t>(places_.size()));
@@ -270,6 +291,7 @@ void PlaceGraph::load(StateReader& reader) {
   *this = PlaceGraph(config_);
   reader.get(next_id_);
   reader.get(num_loops_);
+  reader.get(loop_added_);
   get_pose(T_odom_last_, reader);
   get_sim3(S_map_odom_, reader);
   for (auto left = reader.get<int64_t>(); left > 0; --left) {

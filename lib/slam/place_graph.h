@@ -16,6 +16,12 @@
 
 namespace roadfix {
 
+/// Errors of the odometry from one place to the next.
+struct StepCovariance {
+  Matrix6d pose = Matrix6d::Zero();  ///< position in odom, rotation in camera axes
+  double scale = 0.0;                ///< variance of the logarithm of the scale
+};
+
 /// Observation of one place.
 struct PlaceView {
   SE3 T_odom_camera;
@@ -23,11 +29,12 @@ struct PlaceView {
   cv::Mat descriptors;                                   ///< one row each
   std::vector<std::optional<Eigen::Vector3d>> p_camera;  ///< where the corner has a known point
   Matrix6d cov = Matrix6d::Zero();                       ///< of the camera's pose in map
+  StepCovariance step;                                   ///< from the last place to this one
 };
 
 struct PlaceGraphConfig {
   PoseSolverConfig pose;
-  bool with_scale = false;  ///< monocular: optimise the scale too
+  bool with_scale = false;  ///< monocular: loops compare lengths
   int max_places = 1000;    ///< stored; older ones are removed
 };
 
@@ -35,8 +42,9 @@ class PlaceGraph {
  public:
   explicit PlaceGraph(const PlaceGraphConfig& config) : config_(config) {}
 
-  /// Stores this place; true where a loop was closed. `continuous`: the odometry did not jump since the previous place.
-  bool add_place(const PlaceView& view, bool continuous);
+  /// Adds a loop where this is a known place, and stores it as one if it is to be. True where it was stored and what was
+  /// added since the last one that was has been closed.
+  bool add_view(const PlaceView& view, bool store);
 
   /// Camera pose in odom at a recognised place.
   [[nodiscard]] std::optional<SE3> locate(const PlaceView& view) const;
@@ -48,7 +56,7 @@ class PlaceGraph {
   void move(int64_t first, const SE3& T_odom_odom);
 
   [[nodiscard]] const Sim3& S_map_odom() const { return S_map_odom_; }
-  /// Covariance of the camera's pose in map, right after an add_place() that closed a loop.
+  /// Covariance of the camera's pose in map, right after an add_view() that closed a loop.
   [[nodiscard]] const Matrix6d& cov_after_loop() const { return places_.back().cov; }
   [[nodiscard]] int num_loops() const { return num_loops_; }
   [[nodiscard]] size_t num_places() const { return places_.size(); }
@@ -75,6 +83,9 @@ class PlaceGraph {
   [[nodiscard]] std::optional<Recognition> verify(const PlaceView& view, size_t place, bool with_scale) const;
   void store_place(const PlaceView& view);
   void forget_oldest();
+  void add_step(const PlaceView& view);
+  void add_loop(int64_t known, const Recognition& found, const PlaceView& view, bool stored);
+  void optimise_places();
 
   PlaceGraphConfig config_;
   PlaceIndex index_;
@@ -84,6 +95,7 @@ class PlaceGraph {
   int64_t next_id_ = 0;
   SE3 T_odom_last_;  ///< of the last place
   Sim3 S_map_odom_;
+  bool loop_added_ = false;  ///< and not closed yet
   int num_loops_ = 0;
 };
 

@@ -9,9 +9,8 @@ namespace roadfix {
 namespace {
 
 constexpr int kIterations = 12;
-constexpr double kMinRelativeDecrease = 1e-4;    ///< relative
-constexpr double kLoopWidth = 5.0;               ///< sigmas, width of the Cauchy cost of loops
-constexpr double kFixedScaleInformation = 1e12;  ///< information that fixes a scale
+constexpr double kMinRelativeDecrease = 1e-3;  ///< relative
+constexpr double kLoopWidth = 5.0;             ///< sigmas, width of the Cauchy cost of loops
 
 double cost_of(const std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop) {
   double sum = 0.0;
@@ -40,6 +39,8 @@ Sim3 retract(const Sim3& S, const Vector7d& d) {
   return {(S.q * exp_q(d.segment<3>(3))).normalized(), S.p + d.head<3>(), S.scale * std::exp(d(6))};
 }
 
+Matrix7d whitening_of(const Matrix7d& cov) { return cov.llt().matrixL().solve(Matrix7d::Identity()); }
+
 Vector7d constraint_error(const PoseConstraint& constraint, const Sim3& S_map_a, const Sim3& S_map_b, Matrix7d* J_a,
                           Matrix7d* J_b) {
   const Eigen::Matrix3d R_a_map = S_map_a.q.conjugate().toRotationMatrix();
@@ -49,7 +50,6 @@ Vector7d constraint_error(const PoseConstraint& constraint, const Sim3& S_map_a,
   r.head<3>() = p_a_b - constraint.S_a_b.p;
   r.segment<3>(3) = log_q(constraint.S_a_b.q.conjugate() * q_a_b);
   r(6) = std::log(S_map_b.scale / S_map_a.scale) - std::log(constraint.S_a_b.scale);
-  const Vector7d weight = constraint.sigma.cwiseInverse();
   if (J_a != nullptr && J_b != nullptr) {
     const Eigen::Matrix3d J_log = right_jacobian_inverse(r.segment<3>(3));
     J_a->setZero();
@@ -62,14 +62,13 @@ Vector7d constraint_error(const PoseConstraint& constraint, const Sim3& S_map_a,
     J_a->block<3, 3>(3, 3) = -J_log * q_a_b.conjugate().toRotationMatrix();
     (*J_b)(6, 6) = 1.0;
     (*J_a)(6, 6) = -1.0;
-    *J_a = weight.asDiagonal() * *J_a;
-    *J_b = weight.asDiagonal() * *J_b;
+    *J_a = constraint.whitening * *J_a;
+    *J_b = constraint.whitening * *J_b;
   }
-  return weight.cwiseProduct(r);
+  return constraint.whitening * r;
 }
 
-double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop,
-                bool with_scale) {
+double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop) {
   const auto size = static_cast<Eigen::Index>(7 * (nodes.size() - 1));  // the first node is fixed
   double cost = cost_of(nodes, constraints, first_loop);
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
@@ -93,12 +92,6 @@ double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& con
       if (t.b > t.a) add(t.b, t.a, weight * J_b.transpose() * J_a);
       if (t.a > 0) b.segment<7>(7 * (t.a - 1)) -= weight * J_a.transpose() * r;
       if (t.b > 0) b.segment<7>(7 * (t.b - 1)) -= weight * J_b.transpose() * r;
-    }
-    if (!with_scale) {
-      for (size_t n = 1; n < nodes.size(); ++n) {
-        const int row = 7 * (static_cast<int>(n) - 1) + 6;
-        entries.emplace_back(row, row, kFixedScaleInformation);
-      }
     }
     Eigen::SparseMatrix<double> H(size, size);
     H.setFromTriplets(entries.begin(), entries.end());

@@ -29,16 +29,18 @@ Sim3 retract(const Sim3& S, const Vector7d& d);
 struct PoseConstraint {
   int a = 0, b = 0;
   Sim3 S_a_b;
-  Vector7d sigma = Vector7d::Ones();  ///< of position, rotation and scale
+  Matrix7d whitening = Matrix7d::Identity();  ///< of the error, W'W = inverse of its covariance
 };
 
-/// Residual of a constraint, normalised by sigma, and its Jacobians by the perturbations of both nodes, (S.12.3).
+/// The lower triangular W of a positive definite covariance.
+Matrix7d whitening_of(const Matrix7d& cov);
+
+/// Residual of a constraint, whitened, and its Jacobians by the perturbations of both nodes, (S.12.3).
 Vector7d constraint_error(const PoseConstraint& constraint, const Sim3& S_map_a, const Sim3& S_map_b,
                           Matrix7d* J_a = nullptr, Matrix7d* J_b = nullptr);
 
-/// Gauss-Newton; the first node is fixed. `with_scale`: false fixes every scale. Robust to wrong constraints from
-/// `first_loop` on (Cauchy weights). Returns half the final sum of squares.
-double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop,
-                bool with_scale);
+/// Gauss-Newton; the first node is fixed. Robust to wrong constraints from `first_loop` on (Cauchy weights). Returns half
+/// the final sum of squares.
+double optimise(std::vector<Sim3>& nodes, const std::vector<PoseConstraint>& constraints, size_t first_loop);
 
 }  // namespace roadfix

@@ -43,7 +43,7 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
       std::make_unique<KeyframeTracker>(config.keyframe, camera_rig(calibration),
                                         make_front_end(config.keyframe.front_end, superpoint_weights), *executor_);
   spec_.name = "vo_tracker";
-  spec_.state_layout = 10;
+  spec_.state_layout = 11;
   spec_.inputs = {{"CAMERA_LEFT", "image_t", 0, 0}};
   if (stereo_) spec_.inputs.push_back({"CAMERA_RIGHT", "image_t", 0, 0});
   const auto add = [this](const char* channel, const char* type, int64_t delay_us) {

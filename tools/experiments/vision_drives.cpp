@@ -8,7 +8,7 @@
 /// standard errors, and the NEES of relative poses over 5 s, 30 s and the stretch, rotation and translation apart, the
 /// 5 and 30 s by axis too, with the root mean squares of error and sigma. --right-turn: what the right camera's calibration
 /// has wrong, deg. --laps: horizontal error on the second lap, of the pose and of the one with all loops closed, each aligned
-/// in yaw and place over the whole drive. KEY is one of the tracker's configuration, for example kind=orb; FILE the network of kind=superpoint.
+/// in yaw and place over the whole drive, and each tied to the truth at its first pose. KEY is one of the tracker's configuration, for example kind=orb; FILE the network of kind=superpoint.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -187,20 +187,34 @@ size_t second_lap(const std::vector<Stamped>& poses) {
   return poses.size();
 }
 
-/// Sum of squared horizontal errors from the pose `first` on, all of them aligned in yaw and place.
-double squares_from(const std::vector<Stamped>& poses, size_t first, SE3 Stamped::*estimate) {
+/// Sum of squared horizontal errors from the pose `first` on: all of them aligned in yaw and place, or tied at the first pose.
+double squares_from(const std::vector<Stamped>& poses, size_t first, SE3 Stamped::*estimate, bool tied) {
   std::vector<PosePair> pairs(poses.size());
   for (size_t i = 0; i < poses.size(); ++i) {
     pairs[i].estimate.T_frame_vehicle = poses[i].*estimate;
     pairs[i].reference.T_frame_vehicle = poses[i].T_true;
   }
-  const auto S = align(pairs, Alignment::kYaw);
+  const auto S = tied ? tie(pairs.front()) : align(pairs, Alignment::kYaw);
   if (!S) throw std::runtime_error("the drive does not move");
   double sum = 0.0;
   for (size_t i = first; i < poses.size(); ++i)
     sum += (S->T * pairs[i].estimate.T_frame_vehicle.p - poses[i].T_true.p).head<2>().squaredNorm();
   return sum;
 }
+
+/// Sums of squared horizontal errors, m2: aligned, and tied at the first pose.
+struct SecondLap {
+  size_t poses = 0;
+  std::array<double, 2> open{}, closed{};
+
+  void add(const SecondLap& other) {
+    poses += other.poses;
+    for (size_t k = 0; k < open.size(); ++k) {
+      open[k] += other.open[k];
+      closed[k] += other.closed[k];
+    }
+  }
+};
 
 struct Totals {
   struct Relative {
@@ -220,9 +234,14 @@ struct Totals {
   std::array<Relative, kWindows.size()> windows;
   Relative stretch;
   int64_t poses = 0, pictures = 0;
-  double open = 0.0, closed = 0.0;  ///< sums of squared errors on second laps, m2
-  size_t on_second_lap = 0;
+  SecondLap laps;
 };
+
+void print(const SecondLap& lap) {
+  const auto rms = [&](double sum) { return std::sqrt(sum / static_cast<double>(std::max<size_t>(1, lap.poses))); };
+  std::printf("second laps: open %.4f m, closed %.4f m; tied at the first pose: open %.4f m, closed %.4f m\n",
+              rms(lap.open[0]), rms(lap.closed[0]), rms(lap.open[1]), rms(lap.closed[1]));
+}
 
 double degrees(double rad) { return rad * 180.0 / M_PI; }
 
@@ -256,14 +275,14 @@ void add(const char* name, int seed, const Run& run, const Options& options, int
       run.poses.size(), run.pictures, run.resets);
   if (options.laps) {
     const size_t second = second_lap(poses), count = poses.size() - second;
-    const double open = squares_from(poses, second, &Stamped::T_found);
-    const double closed = squares_from(poses, second, &Stamped::T_closed);
-    const auto n = static_cast<double>(std::max<size_t>(1, count));
-    std::printf("%-4s seed %d: second lap %zu poses, open %.3f m, closed %.3f m, %d loops\n", name, seed, count,
-                std::sqrt(open / n), std::sqrt(closed / n), run.loops);
-    totals.open += open;
-    totals.closed += closed;
-    totals.on_second_lap += count;
+    SecondLap lap{count, {}, {}};
+    for (const bool tied : {false, true}) {
+      lap.open[tied] = squares_from(poses, second, &Stamped::T_found, tied);
+      lap.closed[tied] = squares_from(poses, second, &Stamped::T_closed, tied);
+    }
+    std::printf("%-4s seed %d: %d loops, ", name, seed, run.loops);
+    print(lap);
+    totals.laps.add(lap);
   }
   if (options.stereo) {
     const Eigen::Vector3d turn = run.lens().value.segment<3>(LensCorrection::kRightRotation) * 180.0 / M_PI;
@@ -277,10 +296,9 @@ void print(const char* name, const Totals& t) {
   const auto n = static_cast<double>(t.errors.size());
   if (t.pictures > 0)
     std::printf("%-4s tracked %.4f\n", name, static_cast<double>(t.poses) / static_cast<double>(t.pictures));
-  if (t.on_second_lap > 0) {
-    const auto lap = static_cast<double>(t.on_second_lap);
-    std::printf("%-4s second laps: open %.4f m, closed %.4f m\n", name, std::sqrt(t.open / lap),
-                std::sqrt(t.closed / lap));
+  if (t.laps.poses > 0) {
+    std::printf("%-4s pooled: ", name);
+    print(t.laps);
   }
   if (t.errors.size() < 2) return;
   Vector6d mean = Vector6d::Zero(), square = Vector6d::Zero();

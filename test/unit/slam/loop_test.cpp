@@ -1,5 +1,6 @@
 /// Place recognition and loop closure.
 #include <catch2/catch.hpp>
+#include <cstdio>
 #include <random>
 
 #include "geometry/so3.h"
@@ -26,7 +27,12 @@ TEST_CASE("Jacobians of a pose graph constraint") {
     const Sim3 a = random_sim3(random, 0.8), b = random_sim3(random, 0.8);
     PoseConstraint constraint;
     constraint.S_a_b = random_sim3(random, 0.3) * (a.inverse() * b);
-    constraint.sigma << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.05;
+    Vector7d sigma, common;
+    sigma << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03, 0.05;
+    common << 0.2, -0.1, 0.1, 0.02, 0.01, -0.02, 0.03;
+    const Matrix7d cov = Matrix7d(sigma.cwiseAbs2().asDiagonal()) + common * common.transpose();
+    constraint.whitening = whitening_of(cov);
+    REQUIRE((constraint.whitening * cov * constraint.whitening.transpose()).isIdentity(1e-9));
     Matrix7d J_a, J_b;
     (void)constraint_error(constraint, a, b, &J_a, &J_b);
     constexpr double kStep = 1e-6;
@@ -54,6 +60,13 @@ TEST_CASE("similarities multiply and invert") {
   CHECK(c.scale == Approx(1.0));
 }
 
+StepCovariance step_of(double position, double turn, double scale) {
+  StepCovariance step;
+  step.pose.diagonal() << Eigen::Vector3d::Constant(position * position), Eigen::Vector3d::Constant(turn * turn);
+  step.scale = scale * scale;
+  return step;
+}
+
 /// Distinguishable points around a circle that the camera drives, looking ahead.
 struct World {
   std::vector<Eigen::Vector3d> points;
@@ -73,11 +86,13 @@ struct World {
     }
   }
 
-  [[nodiscard]] PlaceView view(const SE3& T_world_camera, const SE3& T_odom_camera, double scale, unsigned seed) const {
+  [[nodiscard]] PlaceView view(const SE3& T_world_camera, const SE3& T_odom_camera, double scale, unsigned seed,
+                               double noise_px = 0.5) const {
     std::mt19937 random(seed);
-    std::normal_distribution<double> noise(0.0, 0.5 / kFocal);
+    std::normal_distribution<double> noise(0.0, noise_px / kFocal);
     PlaceView v;
     v.T_odom_camera = T_odom_camera;
+    v.step = step_of(0.03, 0.0007, scale == 1.0 ? 0.0 : 0.002);
     const SE3 T_camera_world = T_world_camera.inverse();
     for (size_t i = 0; i < points.size() && v.normalised.size() < 250; ++i) {
       const Eigen::Vector3d p = T_camera_world * points[i];
@@ -124,7 +139,7 @@ Laps two_laps(bool with_scale, int save_at = -1) {
       step.q = step.q * exp_q({0.0, 0.0007, 0.0002});
       T_odom = T_odom * step;
     }
-    (void)places->add_place(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
+    (void)places->add_view(world.view(on_circle(i), T_odom, scale, static_cast<unsigned>(i)), true);
     if (i != save_at) continue;
     StateWriter writer;
     places->save(writer);
@@ -153,14 +168,63 @@ TEST_CASE("a second lap is recognised and the loop closed, with and without scal
   }
 }
 
+/// Root mean square of the map's error over the second lap, the odometry exact and each loop's points `noise_px` off.
+double shaken_m(const StepCovariance& step, double noise_px) {
+  PlaceGraphConfig config;
+  config.pose = {kFocal, 1.0, 4.0 * noise_px, 20, {}};
+  PlaceGraph places(config);
+  const World world(1);
+  double sum = 0.0;
+  for (int i = 0; i <= 2 * kLap; ++i) {
+    PlaceView view = world.view(on_circle(i), on_circle(i), 1.0, static_cast<unsigned>(i), noise_px);
+    view.step = step;
+    (void)places.add_view(view, true);
+    if (i > kLap)
+      sum += (places.S_map_odom().p + places.S_map_odom().q * on_circle(i).p - on_circle(i).p).squaredNorm();
+  }
+  return std::sqrt(sum / kLap);
+}
+
+TEST_CASE("loops do not shake what the odometry knows better") {
+  const double sure = shaken_m(step_of(0.002, 2e-5, 0.0), 3.0), unsure = shaken_m(step_of(0.05, 0.003, 0.0), 3.0);
+  std::printf("second lap of an exact odometry: %.3f m off where it is known to be good, %.3f m where not\n", sure,
+              unsure);
+  CHECK(sure < 0.02);
+  CHECK(unsure > 2.0 * sure);  // teeth: loops shake it
+}
+
+TEST_CASE("a picture that becomes no place closes loops as well") {
+  PlaceGraphConfig config;
+  config.pose = {kFocal, 1.0, 4.0, 20, {}};
+  const World known(1), other(2);
+  for (const bool store : {true, false}) {
+    PlaceGraph places(config);
+    for (int i = 0; i < kLap; ++i) (void)places.add_view(known.view(on_circle(i), on_circle(i), 1.0, 1), true);
+    const SE3 T_new_old{exp_q({0.0, 0.02, 0.0}), {0.4, 0.0, -0.3}};  // the odometry's error from the next place on
+    PlaceView unknown = other.view(on_circle(0.0), T_new_old * on_circle(0.0), 1.0, 2);
+    unknown.step = step_of(1.0, 0.1, 0.0);
+    REQUIRE(!places.add_view(unknown, true));
+    const int loops = places.num_loops();
+    REQUIRE(places.add_view(known.view(on_circle(0.3), T_new_old * on_circle(0.3), 1.0, 3), store) == store);
+    const SE3 T_odom = T_new_old * on_circle(0.6);
+    REQUIRE(places.add_view(other.view(on_circle(0.6), T_odom, 1.0, 4), true) != store);
+    CHECK(places.num_loops() == loops + 1);
+    CHECK(places.num_places() == static_cast<size_t>(store ? kLap + 3 : kLap + 2));
+    const Sim3 found = places.S_map_odom() * Sim3{T_odom.q, T_odom.p, 1.0};
+    CHECK((T_odom.p - on_circle(0.6).p).norm() > 0.4);  // teeth
+    CHECK((found.p - on_circle(0.6).p).norm() < 0.05);
+    if (!store) CHECK(places.cov_after_loop().topLeftCorner<3, 3>().trace() < 0.1 * 0.1);
+  }
+}
+
 TEST_CASE("another street is not recognised as the first") {
   PlaceGraphConfig config;
   config.pose = {kFocal, 1.0, 4.0, 20, {}};
   const World known(1), other(2);
   const auto loops = [&](const World& later) {
     PlaceGraph places(config);
-    for (int i = 0; i < 30; ++i) (void)places.add_place(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
-    for (int i = 0; i < 30; ++i) (void)places.add_place(later.view(on_circle(i), on_circle(i), 1.0, 6), false);
+    for (int i = 0; i < 30; ++i) (void)places.add_view(known.view(on_circle(i), on_circle(i), 1.0, 5), true);
+    for (int i = 0; i < 30; ++i) (void)places.add_view(later.view(on_circle(i), on_circle(i), 1.0, 6), true);
     return places.num_loops();
   };
   CHECK(loops(other) == 0);
@@ -179,7 +243,7 @@ TEST_CASE("the number of places is bounded") {
   config.max_places = 30;
   PlaceGraph places(config);
   const World world(1);
-  for (int i = 0; i < 2 * kLap; ++i) (void)places.add_place(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
+  for (int i = 0; i < 2 * kLap; ++i) (void)places.add_view(world.view(on_circle(i), on_circle(i), 1.0, 7), true);
   CHECK(places.num_places() == 30);
 }
 
