@@ -98,8 +98,12 @@ Loss loss(const Stamped& a, const Stamped& b) {
   const Matrix6d F = pose_transport_jacobian(a.T_found, found);
   const auto without_scales = [](const Stamped& s) -> Matrix6d { return s.cov - s.scales * s.scales.transpose(); };
   const ScaleSensitivity scales = b.scales - F * a.scales;
-  const Matrix6d P = without_scales(b) + b.map + scales * scales.transpose() -
-                     F * (without_scales(a) - 2.0 * a.image - a.map) * F.transpose();
+  // A difference of large covariances: what rounding and adjustments since leave negative of it is nothing.
+  const Matrix6d grown = without_scales(b) - b.image - F * (without_scales(a) - a.image) * F.transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (grown + grown.transpose()));
+  const Matrix6d P =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose() +
+      b.image + b.map + scales * scales.transpose() + F * (a.image + a.map) * F.transpose();
   const Eigen::Matrix3d place = R.transpose() * P.topLeftCorner<3, 3>() * R;
   const Eigen::Matrix3d turn = found.R() * P.bottomRightCorner<3, 3>() * found.R().transpose();
   const Eigen::Vector3d p = l.error.head<3>(), r = l.error.tail<3>();
