@@ -360,7 +360,9 @@ Odometry KeyframeTracker::at(int64_t t_us) const {
   return odometry;
 }
 
-Odometry KeyframeTracker::closed(Odometry odometry) const { return loops_.closed(odometry, out_.cov_closed); }
+Odometry KeyframeTracker::closed(Odometry odometry) const {
+  return loops_.closed(std::move(odometry), out_.cov_closed);
+}
 
 void KeyframeTracker::digest(Digest& digest) const {
   digest.add(camera_.T_map_camera.q.coeffs());

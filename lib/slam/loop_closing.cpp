@@ -89,7 +89,7 @@ bool LoopClosing::add_keyframe(const cv::Mat& gray, std::span<const Feature> fea
 std::optional<SE3> LoopClosing::locate(const cv::Mat& gray, const LocalMap& map, const SE3& T_map_camera, double speed,
                                        double unseen_s) const {
   if (!enabled_ || places_.num_places() == 0) return std::nullopt;
-  const auto found = places_.locate(view(gray, {}, map, T_map_camera));
+  auto found = places_.locate(view(gray, {}, map, T_map_camera));
   const double sigma = std::sqrt(covariance_.keyframe().topLeftCorner<3, 3>().trace());
   if (!found || !within_reach((found->p - T_map_camera.p).norm(), speed, unseen_s, sigma)) return std::nullopt;
   return found;
