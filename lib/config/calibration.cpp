@@ -112,6 +112,8 @@ void visit(CameraCalibration& c, Visitor& v) {
   v.optional_number("time_offset_s", c.time_offset, -kMaxSeconds, kMaxSeconds);
   v.optional_number("time_offset_std_s", c.time_offset_std, 0.0, kMaxSeconds);
   v.optional_number("stamp_jitter_s", c.stamp_jitter, 0.0, kMaxSeconds);
+  v.optional_number("focal_std", c.focal_std, 0.0, 0.2);
+  v.optional_number("radial_std", c.radial_std, 0.0, 0.5);
   v.optional_group("T_body_camera", c.mounting);
 }
 

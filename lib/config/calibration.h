@@ -89,6 +89,8 @@ struct CameraCalibration {
   std::optional<double> time_offset;      ///< s: IMU time = stamp + this
   std::optional<double> time_offset_std;  ///< s, of its stamps against the IMU's
   std::optional<double> stamp_jitter;     ///< s
+  std::optional<double> focal_std;        ///< relative, of the focal length
+  std::optional<double> radial_std;       ///< of the coefficient of r^2 that is left after undistortion
   std::optional<CameraMounting> mounting;
 };
 

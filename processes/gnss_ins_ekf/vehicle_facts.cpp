@@ -34,6 +34,11 @@ std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibrati
   take_known(left.time_offset, c.offset);
   c.offset_std = left.time_offset_std.value_or(kUnknownCameraOffset);
   take_known(left.stamp_jitter, c.stamp_jitter);
+  take_known(left.focal_std, c.focal_std);
+  if (left.radial_std) {
+    c.radial_std = *left.radial_std;
+    c.radial4_std = 2.0 * c.radial_std;
+  }
   take_known(left.rate, c.rate);
   if (sensors.camera_right) {
     c.right = camera_intrinsics(*sensors.camera_right, "camera_right");

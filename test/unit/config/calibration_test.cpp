@@ -27,6 +27,8 @@ sensors:
     colour: bgr
     time_offset_std_s: 0.3
     stamp_jitter_s: 0.05
+    focal_std: 0.004
+    radial_std: 0.02
     T_body_camera: {p_m: [0.5, 0.1, 1.2], q_wxyz: [0.5, -0.5, 0.5, -0.5], std_m: 1.0, std_deg: 15}
   stereo: {scale_std: 0.002, focal_std: 0.001}
 mounting: {angles_deg: [1, 2, -30], std_deg: [5, 4, 3]}
@@ -45,6 +47,8 @@ TEST_CASE("a full calibration is read and written without loss") {
   CHECK(c.sensors.mag->soft_iron.value()(1, 2) == 0.1);
   CHECK(c.sensors.camera_left->distortion->coefficients.size() == 4);
   CHECK(c.sensors.camera_left->mounting->T_body_camera().q.coeffs() == Eigen::Vector4d(-0.5, 0.5, -0.5, 0.5));
+  CHECK(c.sensors.camera_left->focal_std == 0.004);
+  CHECK(c.sensors.camera_left->radial_std == 0.02);
   CHECK_FALSE(c.sensors.camera_right.has_value());
   CHECK(c.sensors.stereo->scale_std == 0.002);
   CHECK(c.sensors.stereo->focal_std == 0.001);

@@ -20,9 +20,10 @@ struct CameraFacts {
   double offset_std = 0.0;       ///< s
   double stamp_jitter = 0.0;     ///< s, by which single stamps are late
   double rate = 0.0;             ///< Hz; zero: not known, and late stamps stay as they are
-  double focal_std = 0.01;       ///< relative, of one eye's focal length; two eyes: theirs is taken as it is
-  double radial_std = 0.02;      ///< coefficient of r^2 left over, of one eye, (N.6.9)
-  double radial4_std = 0.05;     ///< coefficient of r^4
+  /// Of the lens of one eye, (N.6.9); two eyes: theirs is taken as it is. What a calibration leaves, MODEL.md.
+  double focal_std = 0.003;   ///< relative
+  double radial_std = 0.005;  ///< coefficient of r^2
+  double radial4_std = 0.01;  ///< coefficient of r^4
 };
 
 }  // namespace roadfix::navigation

@@ -116,6 +116,12 @@ TEST_CASE("what a calibration says of a camera") {
   CHECK(camera_facts(c)->offset_std == 0.03);  // a camera whose clock nobody compared is not exact
   c.sensors.camera_left->time_offset = -0.02;
   CHECK(camera_facts(c)->offset == -0.02);
+  CHECK(camera_facts(c)->radial_std == navigation::CameraFacts().radial_std);
+  c.sensors.camera_left->focal_std = 0.02;
+  c.sensors.camera_left->radial_std = 0.1;
+  CHECK(camera_facts(c)->focal_std == 0.02);
+  CHECK(camera_facts(c)->radial_std == 0.1);
+  CHECK(camera_facts(c)->radial4_std == 0.2);
   CHECK_FALSE(camera_facts(c)->right);
   c.sensors.camera_right = c.sensors.camera_left;
   c.sensors.camera_right->mounting->p.y() -= 0.54;
