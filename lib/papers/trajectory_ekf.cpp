@@ -15,8 +15,8 @@ void LiteralTrajectoryEkf::start(const Eigen::Vector2d& mean, const Eigen::Vecto
 void LiteralTrajectoryEkf::add(const Eigen::Vector2d& measured) {
   if (!last_) return start(measured, measured, config_.measurement_sigma * config_.measurement_sigma);
   const Eigen::Matrix2d I = Eigen::Matrix2d::Identity();
-  mean_ += measured - *last_;  // u_t, with G = I
-  P_ += config_.process_sigma * config_.process_sigma * I;
+  mean_ += measured - *last_;                               // u_t, with G = I
+  P_ += config_.process_sigma * config_.process_sigma * I;  // G P G' + R_t
   const Eigen::Matrix2d K = P_ * (P_ + config_.measurement_sigma * config_.measurement_sigma * I).inverse();
   const Eigen::Vector2d innovation = measured - mean_;
   innovation_norm_ = innovation.norm();

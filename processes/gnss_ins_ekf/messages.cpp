@@ -73,16 +73,17 @@ void fill_estimates(const navigation::Filter& filter, const navigation::VehicleF
 
 /// AidingSource in aiding_t's words and as a bit of ins_status_t's, AidingStatus in aiding_t's: by name, since those of the
 /// library may come in another order.
-constexpr std::array<int8_t, navigation::kAidingSources> kSources = {
-    aiding_t::SOURCE_GNSS_POSITION, aiding_t::SOURCE_GNSS_VELOCITY, aiding_t::SOURCE_GNSS_HEADING,
-    aiding_t::SOURCE_WHEEL_SPEED,   aiding_t::SOURCE_NO_SIDESLIP,   aiding_t::SOURCE_ZERO_VELOCITY,
-    aiding_t::SOURCE_ZERO_RATE,     aiding_t::SOURCE_MAG_HEADING,   aiding_t::SOURCE_WHEEL_YAW_RATE,
-    aiding_t::SOURCE_CAMERA_TRACKS, aiding_t::SOURCE_PRIOR_POSE};
-constexpr std::array<int32_t, navigation::kAidingSources> kAided = {
-    ins_status_t::AIDED_GNSS_POSITION, ins_status_t::AIDED_GNSS_VELOCITY, ins_status_t::AIDED_GNSS_HEADING,
-    ins_status_t::AIDED_WHEEL_SPEED,   ins_status_t::AIDED_NO_SIDESLIP,   ins_status_t::AIDED_ZERO_VELOCITY,
-    ins_status_t::AIDED_ZERO_RATE,     ins_status_t::AIDED_MAG_HEADING,   ins_status_t::AIDED_WHEEL_YAW_RATE,
-    ins_status_t::AIDED_CAMERA_TRACKS, ins_status_t::AIDED_PRIOR_POSE};
+constexpr auto kSources = std::to_array<int8_t>(
+    {aiding_t::SOURCE_GNSS_POSITION, aiding_t::SOURCE_GNSS_VELOCITY, aiding_t::SOURCE_GNSS_HEADING,
+     aiding_t::SOURCE_WHEEL_SPEED, aiding_t::SOURCE_NO_SIDESLIP, aiding_t::SOURCE_ZERO_VELOCITY,
+     aiding_t::SOURCE_ZERO_RATE, aiding_t::SOURCE_MAG_HEADING, aiding_t::SOURCE_WHEEL_YAW_RATE,
+     aiding_t::SOURCE_CAMERA_TRACKS, aiding_t::SOURCE_PRIOR_POSE});
+constexpr auto kAided = std::to_array<int32_t>(
+    {ins_status_t::AIDED_GNSS_POSITION, ins_status_t::AIDED_GNSS_VELOCITY, ins_status_t::AIDED_GNSS_HEADING,
+     ins_status_t::AIDED_WHEEL_SPEED, ins_status_t::AIDED_NO_SIDESLIP, ins_status_t::AIDED_ZERO_VELOCITY,
+     ins_status_t::AIDED_ZERO_RATE, ins_status_t::AIDED_MAG_HEADING, ins_status_t::AIDED_WHEEL_YAW_RATE,
+     ins_status_t::AIDED_CAMERA_TRACKS, ins_status_t::AIDED_PRIOR_POSE});
+static_assert(kSources.size() == navigation::kAidingSources && kAided.size() == navigation::kAidingSources);
 constexpr std::array<int8_t, 7> kStatuses = {
     aiding_t::STATUS_ACCEPTED,    aiding_t::STATUS_GATED, aiding_t::STATUS_NOT_READY, aiding_t::STATUS_BAD_INPUT,
     aiding_t::STATUS_BAD_QUALITY, aiding_t::STATUS_RESET, aiding_t::STATUS_DISABLED};

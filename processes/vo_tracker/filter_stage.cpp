@@ -23,7 +23,7 @@ namespace {
 enum Output { kPose = 0, kStatus = 1, kFeatures = 2 };
 constexpr int kImu = 0, kLeft = 1, kRight = 2;
 
-constexpr int64_t kWheelLateness_us = 50'000;    // docs/DESIGN.md, section 4
+constexpr int64_t kWheelLateness_us = 50'000;    // as gnss_ins_ekf has it
 constexpr int64_t kCameraLateness_us = 200'000;  // exposure, encoding, transport
 constexpr int64_t kImuTimeout_us = 200'000;
 

@@ -20,7 +20,7 @@ constexpr int kLeft = 0, kRight = 1;
 enum Output { kPose = 0, kStatus = 1, kFeatures = 2, kClosed = 3 };
 
 constexpr int64_t kFeedback_us = 500'000;    // docs/DESIGN.md, section 4
-constexpr int64_t kWheels_us = 50'000;       // the lateness of WHEELS there
+constexpr int64_t kWheels_us = 50'000;       // lateness, as gnss_ins_ekf has it
 constexpr int64_t kCameraLost_us = 250'000;  // a few frames: then the left camera continues alone
 
 std::unique_ptr<Executor> make_executor(int threads) {

@@ -15,10 +15,10 @@ namespace roadfix {
 pose_t vo_pose(const TrackedFrame& frame, const Odometry& odometry, BodyOrigin origin);
 /// The pose with all loops closed, with resets of its own.
 pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOrigin origin);
-/// `shared`: scale sensitivity of the pose published beside it.
 /// As in the configuration and in VO_STATUS.
 const char* name_of(FrontEndKind kind);
 
+/// `shared`: scale sensitivity of the pose published beside it.
 vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end);
 /// Of mode `filter`.
 vo_status_t filter_status(const navigation::NavigationOutput& output, const navigation::Navigation& filter,

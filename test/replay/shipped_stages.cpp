@@ -87,6 +87,17 @@ const std::vector<DriveMessage>& estimates() {
   return kEstimates;
 }
 
+/// The same, and what the fusion makes of it.
+const std::vector<DriveMessage>& fused() {
+  static const std::vector<DriveMessage> kFused = [] {
+    std::vector<DriveMessage> all = estimates();
+    for (DriveMessage& m : outputs(make_imm_fusion(demo_calibration(), {}), estimates())) all.push_back(std::move(m));
+    sort_by_utime(all);
+    return all;
+  }();
+  return kFused;
+}
+
 std::unique_ptr<Stage> make_tracker(const Calibration& calibration, VoMode mode) {
   VoTrackerConfig config;
   config.mode = mode;
@@ -101,7 +112,7 @@ const std::vector<ShippedStage>& shipped_stages() {
       {"gnss_ins_ekf", demo_calibration(), [](const Calibration& c) { return make_gnss_ins_ekf(c, {}); }, demo},
       {"wheel_odometry", demo_calibration(), [](const Calibration& c) { return make_wheel_odometry(c, {}); }, demo},
       {"imm_fusion", demo_calibration(), [](const Calibration& c) { return make_imm_fusion(c, {}); }, estimates},
-      {"integrity", demo_calibration(), [](const Calibration& c) { return make_integrity(c, {}); }, estimates},
+      {"integrity", demo_calibration(), [](const Calibration& c) { return make_integrity(c, {}); }, fused},
       {"vo_tracker, stereo", picture_car(true), [](const Calibration& c) { return make_tracker(c, VoMode::kKeyframe); },
        picture_drive},
       {"vo_tracker, mode filter", picture_car(false),

@@ -26,9 +26,19 @@ Aiding::Aiding(const NavigationConfig& config)
 }
 
 AidingSource Aiding::source_of(Queued::Kind kind) {
-  constexpr std::array kSources = {AidingSource::kGnssPosition, AidingSource::kGnssVelocity, AidingSource::kGnssHeading,
-                                   AidingSource::kWheelSpeed, AidingSource::kMagneticHeading};
-  return kSources[static_cast<size_t>(kind)];
+  switch (kind) {
+    case Queued::Kind::kPosition:
+      return AidingSource::kGnssPosition;
+    case Queued::Kind::kVelocity:
+      return AidingSource::kGnssVelocity;
+    case Queued::Kind::kHeading:
+      return AidingSource::kGnssHeading;
+    case Queued::Kind::kWheels:
+      return AidingSource::kWheelSpeed;
+    case Queued::Kind::kMagnetic:
+      return AidingSource::kMagneticHeading;
+  }
+  return {};
 }
 
 AidingRecord Aiding::use(Filter& filter, const Queued& q) {
