@@ -83,8 +83,11 @@ endfunction()
 # roadfix_test(NAME LABELS unit SOURCES a_test.cpp ... DEPS ...) makes bin/NAME_test; each Catch2 test case is one CTest.
 # A test case that needs ../shared prints a line "skipped: ..." where it is missing (test/support/shared_data.h); CTest then reports it as skipped.
 function(roadfix_test NAME)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "LABELS;SOURCES;DEPS;SYSTEM_DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;LABELS" "SOURCES;DEPS;SYSTEM_DEPS" ${ARGN})
   list(TRANSFORM ARG_DEPS PREPEND roadfix_)
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "roadfix_test(${NAME}): what is ${ARG_UNPARSED_ARGUMENTS}? A test has one label.")
+  endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 1800)
   endif()

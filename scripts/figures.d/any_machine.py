@@ -10,7 +10,7 @@ import time
 
 from support import Skipped
 
-CHECKED = ("fusion", "navigation", "wheel")  # the first that is there
+ESTIMATORS = ("inertial", "vehicle", "navigation", "wheel", "slam", "fusion")
 
 
 def tell(key, text):
@@ -72,22 +72,22 @@ def loaded_failures(runs):
 
 
 def check_s(runs):
-    """scripts/check of an estimator library after a change of its largest .cpp file, everything built before."""
-    name = next((name for name in CHECKED if (runs.root / "lib" / name).is_dir()), None)
-    if name is None:
-        raise Skipped(f"none of the libraries {', '.join(CHECKED)} is here")
-    source = max((runs.root / "lib" / name).glob("*.cpp"), key=lambda path: path.stat().st_size)
-    runs.call(runs.root / "scripts" / "check", name)  # warm
-    text = source.read_text()
-    begin, begin_s = time.monotonic(), cpu_s()
-    try:
-        source.write_text(f'{text}static_assert(true, "{time.time_ns()}");\n')  # new tokens, or the compiler cache would answer
-        runs.call(runs.root / "scripts" / "check", name)
-        took_s = time.monotonic() - begin
-    finally:
-        source.write_text(text)
-    tell("check_s", f"{name}, {source.name} changed: {cpu_s() - begin_s:.0f} s of CPU")
-    return took_s
+    """scripts/check of an estimator library after a change of its largest .cpp file, everything built before: of ESTIMATORS the slowest."""
+    slowest_s = 0.0
+    for name in ESTIMATORS:
+        source = max((runs.root / "lib" / name).glob("*.cpp"), key=lambda path: path.stat().st_size)
+        runs.call(runs.root / "scripts" / "check", name)  # warm
+        text = source.read_text()
+        begin, begin_s = time.monotonic(), cpu_s()
+        try:
+            source.write_text(f'{text}static_assert(true, "{time.time_ns()}");\n')  # new tokens, or the compiler cache would answer
+            runs.call(runs.root / "scripts" / "check", name)
+            took_s = time.monotonic() - begin
+        finally:
+            source.write_text(text)
+        tell("check_s", f"{name}, {source.name} changed: {took_s:.0f} s, {cpu_s() - begin_s:.0f} s of CPU")
+        slowest_s = max(slowest_s, took_s)
+    return slowest_s
 
 
 MEASUREMENTS = {
