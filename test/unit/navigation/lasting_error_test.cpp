@@ -9,6 +9,8 @@ using namespace roadfix::navigation;
 
 namespace {
 
+const LastingErrorModels kAnyReceiver({5.0, 15.0, 50.0}, 0.9);
+
 struct Receiver {
   double sigma = 2.0, share = 0.0, time = 15.0;  // m, of the whole error; share of its variance that lasts; s
   double claim = 2.0;                            // m
@@ -16,10 +18,10 @@ struct Receiver {
   double drift = 0.02;                           // m/sqrt(s), of the way, as claimed
 };
 
-LastingError found(const Receiver& r, double duration, unsigned seed) {
+LastingErrorModels seen(const Receiver& r, double duration, unsigned seed) {
   std::mt19937 rng(seed);
   std::normal_distribution<double> n;
-  LastingErrorModels models({5.0, 15.0, 50.0});
+  LastingErrorModels models = kAnyReceiver;
   const double decay = std::exp(-r.interval / r.time), lasting = std::sqrt(r.share) * r.sigma;
   const double white = std::sqrt(1.0 - r.share) * r.sigma;
   const auto pair = [&] {
@@ -36,7 +38,7 @@ LastingError found(const Receiver& r, double duration, unsigned seed) {
                 Eigen::Vector2d::Constant(r.drift * r.drift)});
     way += 0.1 * off;
   }
-  return models.mean();
+  return models;
 }
 
 /// Mean over some receivers.
@@ -44,7 +46,7 @@ LastingError mean(const Receiver& r, double duration) {
   constexpr int kReceivers = 11;
   LastingError sum{0.0, 0.0};
   for (unsigned seed = 1; seed <= kReceivers; ++seed) {
-    const LastingError e = found(r, duration, seed);
+    const LastingError e = seen(r, duration, seed).mean();
     sum.share += e.share / kReceivers;
     sum.rate += e.rate / kReceivers;
   }
@@ -54,7 +56,7 @@ LastingError mean(const Receiver& r, double duration) {
 }  // namespace
 
 TEST_CASE("before fixes have shown anything errors are taken for nearly white") {
-  const LastingError prior = LastingErrorModels({5.0, 15.0, 50.0}).mean();
+  const LastingError prior = kAnyReceiver.mean();
   CHECK(prior.share > 0.0);
   CHECK(prior.share < 0.1);
 }
@@ -75,6 +77,21 @@ TEST_CASE("errors that last are found to last, and for how long") {
     CHECK(slow.share > 0.6);
     CHECK(quick.rate > 0.1);
     CHECK(slow.rate < 0.05);
+  }
+}
+
+TEST_CASE("how much larger errors are than they claim to be is found, whether they last or not") {
+  CHECK(kAnyReceiver.variance_factor() == 1.0);
+  for (const double share : {0.0, 0.5, 0.8}) {
+    double factor = 0.0, honest = 0.0;
+    for (unsigned seed = 1; seed <= 11; ++seed) {
+      factor += seen({4.0, share, 5.0, 2.0}, 180.0, seed).variance_factor() / 11.0;
+      honest += seen({4.0, share, 5.0, 4.0}, 180.0, seed).variance_factor() / 11.0;
+    }
+    CAPTURE(share, factor, honest);
+    CHECK(factor > 2.8);
+    CHECK(factor < 5.2);
+    CHECK(honest < 1.4);  // teeth: the first would not pass
   }
 }
 

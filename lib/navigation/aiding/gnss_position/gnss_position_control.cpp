@@ -19,10 +19,14 @@ constexpr LastingError kPhase = {0.03, 1.0 / 20.0};
 // walk of twice its variance times this, and no less than a centimetre.
 constexpr double kVelocityTime = 1.0;  // s
 constexpr double kLeastDrift = 0.01;   // m/sqrt(s)
+constexpr double kWheelTime = 0.25;    // s, likewise, of a car without an imu: its speed is measured anew each time
+// A code receiver without an imu beside it: from multipath of a moving car to smoothing, and hardly ever white.
+constexpr LastingErrorModels::Times kStreetTimes = {3.0, 10.0, 30.0};  // s
+constexpr double kStreetWhite = 0.1;
+constexpr double kSettled = 0.1;  // of a fix's sigma: less is over
 // m: how far off a receiver without a fixed phase may come back from an outage, level and up; how far off a displaced one
 // typically is.
 constexpr double kReturnLevel = 3.0, kReturnUp = 6.0;
-constexpr double kSettled = 0.1;  // of a fix's sigma: less is over
 constexpr double kDisplacement = 5.0;
 constexpr double kDisplacedPrior = 0.01;    // of a run of rejected fixes
 constexpr double kDisplacedWalk = 0.5;      // m/sqrt(s), of a displacement
@@ -73,17 +77,24 @@ const Eigen::Vector3d kReturn(kReturnLevel, kReturnLevel, kReturnUp);
 }  // namespace
 
 GnssPositionControl::GnssPositionControl(const NavigationConfig& config)
-    : config_(config), gates_(config.aiding.gate_sigma), open_(Gates::open()) {}
+    : config_(config), gates_(config.aiding.gate_sigma), open_(Gates::open()) {
+  for (size_t i = 0; i < receivers_.size(); ++i)
+    if (heavy_tailed(static_cast<FixType>(i))) receivers_[i].lasting = LastingErrorModels(kStreetTimes, kStreetWhite);
+}
 
 LastingError GnssPositionControl::lasting(FixType type) const {
   if (!config_.aiding.lasting_errors) return {};
-  if (heavy_tailed(type)) return {error_time_.share(), 1.0 / error_time_.time()};
   return type == FixType::kRtkFixed ? kPhase : receiver(type).lasting.mean();
 }
 
+double GnssPositionControl::variance_factor(FixType type) const {
+  const Receiver& r = receiver(type);
+  const double scale = r.scale.variance_factor();
+  return heavy_tailed(type) ? std::max(scale, r.lasting.variance_factor()) : scale;
+}
+
 Eigen::Vector3d GnssPositionControl::lasting_std(const GnssFix& fix) const {
-  const Receiver& r = receiver(fix.fix_type);
-  Eigen::Vector3d variance = lasting(fix.fix_type).share * r.scale.variance_factor() * fix.cov_enu.diagonal();
+  Eigen::Vector3d variance = lasting(fix.fix_type).share * variance_factor(fix.fix_type) * fix.cov_enu.diagonal();
   return variance.cwiseSqrt();
 }
 
@@ -121,10 +132,9 @@ bool GnssPositionControl::returns(int64_t t_us, FixType type) const {
 }
 
 GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const {
-  const Receiver& r = receiver(fix.fix_type);
   Bias bias;
   bias.like = lasting(fix.fix_type);
-  bias.std = (bias.like.share * r.scale.variance_factor() * fix.cov.diagonal()).cwiseSqrt();
+  bias.std = (bias.like.share * variance_factor(fix.fix_type) * fix.cov.diagonal()).cwiseSqrt();
   bias.anew = used_at_us_ == 0 || after_outage(fix.t_us) || fix.fix_type != last_type_;
   bias.returns = returns(fix.t_us, fix.fix_type);
   return bias;
@@ -132,8 +142,7 @@ GnssPositionControl::Bias GnssPositionControl::bias_of(const Queued& fix) const 
 
 /// Where b begins anew it is part of the noise, so that a rejected fix leaves the filter as it was.
 Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queued& fix, const Bias& bias) const {
-  const Receiver& r = receiver(fix.fix_type);
-  const double white = (1.0 - bias.like.share) * r.scale.variance_factor();
+  const double white = (1.0 - bias.like.share) * variance_factor(fix.fix_type);
   Measurement<3> m =
       gnss_position(filter.state(), filter.motion(), fix.value, white * fix.cov, fix.ahead(filter.state().x));
   m.shows_steps = !displaced();  // how a displacement moves is assumed
@@ -181,52 +190,33 @@ AidingRecord GnssPositionControl::try_on(Filter& filter, const Queued& fix) cons
   return filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
 }
 
-/// (N.5.13): errors of Student's t. What a fix misses by beyond its noise widens that noise and the Gauss-Markov error by
-/// the weight of the scale mixture, (nu + m) / (nu + d); no gate, and the next fix may be off by the same.
-AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias) {
-  bias.std *= std::sqrt(error_time_.variance_factor());
+/// (N.5.13): errors of Student's t. What a fix misses by beyond its noise widens that noise by the weight of the scale
+/// mixture, (nu + m) / (nu + d); no gate.
+AidingRecord GnssPositionControl::use_heavy_tailed(Filter& filter, const Queued& fix, const Bias& bias) {
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), open_.nis[3]);
   if (r.status != AidingStatus::kAccepted) return r;
   const double wider = std::max(1.0, (kTailFreedom + r.nis) / (kTailFreedom + r.dof));
-  filter.flush();
-  const double spread = filter.state().P().block<2, 2>(kPos, kPos).trace();
-  if (last_place_) {
-    way_ += filter.state().x.nav.position.head<2>() - *last_place_;
-    way_std_ += std::sqrt(std::max(0.5 * (spread - last_spread_), 0.0));
-  }
-  const Eigen::Vector2d variance = receiver(fix.fix_type).scale.variance_factor() * fix.cov.diagonal().head<2>();
-  if (config_.aiding.lasting_errors)
-    error_time_.add(fix.t_us, fix.value.head<2>() - way_, variance.cwiseSqrt(), way_std_);
   set_bias(filter, bias);
-  filter.gnss_bias().position_time.z() = ErrorTime::kPrior;  // nothing drives up and down that would show it
-  for (int i = 0; i < 3 && wider > 1.0; ++i) {
-    BaseVector d = BaseVector::Zero();
-    d(kGnssBias + i) = std::sqrt(wider - 1.0) * bias.std(i);
-    filter.widen(d);
-  }
-  const Bias now = bias.begun();
-  Measurement<3> m = measurement(filter, fix, now);
+  Measurement<3> m = measurement(filter, fix, bias.begun());
   m.R *= wider;
   (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, m, open_.nis[3]);
-  last_place_ = filter.state().x.nav.position.head<2>();
-  last_spread_ = filter.state().P().block<2, 2>(kPos, kPos).trace();
   r.nis /= wider;
   learn(fix, r);
-  if (config_.aiding.lasting_errors)
-    error_time_.see_innovation(
-        {r.innovation[0] / std::sqrt(r.innovation_variance[0]), r.innovation[1] / std::sqrt(r.innovation_variance[1])});
-  settle(filter, fix);
-  note(fix.t_us, fix.fix_type);
   return r;
 }
 
 AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
   see(fix.t_us);
   Bias bias = bias_of(fix);
-  if (heavy_tailed(fix.fix_type)) return use_heavy_tailed(filter, fix, bias);
-  last_place_.reset();
-  error_time_.clear();
   const Eigen::Vector2d before = off_way(filter, fix);
+  if (heavy_tailed(fix.fix_type)) {
+    const AidingRecord r = use_heavy_tailed(filter, fix, bias);
+    if (r.status != AidingStatus::kAccepted) return r;
+    watch(filter, fix, bias, before);
+    settle(filter, fix);
+    note(fix.t_us, fix.fix_type);
+    return r;
+  }
   AidingRecord r = filter.judge(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), gates_.nis[3]);
   if (r.status == AidingStatus::kGated && filter.state().gnss_returns() && jumped_back(filter, fix, bias)) {
     bias.returns = true;
@@ -314,7 +304,7 @@ void GnssPositionControl::watch(const Filter& filter, const Queued& fix, const B
   if (!config_.aiding.lasting_errors || displaced() || filter.state().gnss_returns()) return models.begin_anew();
   const Eigen::Array2d velocity = filter.state().P().diagonal().segment<2>(kVel);
   models.add({fix.t_us, before, off_way(filter, fix), fix.cov.diagonal().head<2>(),
-              2.0 * kVelocityTime * velocity + kLeastDrift * kLeastDrift});
+              2.0 * (config_.facts.has_imu ? kVelocityTime : kWheelTime) * velocity + kLeastDrift * kLeastDrift});
 }
 
 /// The height alone contradicts: it becomes an error of the receiver's height, which fades as its errors do.

@@ -9,7 +9,6 @@
 #include <array>
 
 #include "navigation/aiding/gates.h"
-#include "navigation/aiding/gnss_position/error_time.h"
 #include "navigation/aiding/gnss_position/lasting_error.h"
 #include "navigation/aiding/gnss_position/rejected_run.h"
 #include "navigation/aiding/noise_scale.h"
@@ -72,19 +71,15 @@ class GnssPositionControl {
       r.scale.serialise(a);
       r.lasting.serialise(a);
     }
-    a(used_at_us_, seen_at_us_, outage_, last_type_, share_, displaced_since_us_, back_, height_displaced_, way_,
-      way_std_, last_spread_);
+    a(used_at_us_, seen_at_us_, outage_, last_type_, share_, displaced_since_us_, back_, height_displaced_);
     run_.serialise(a);
-    error_time_.serialise(a);
-    serialise_optional(
-        a, last_place_, [] { return Eigen::Vector2d(0.0, 0.0); }, [&](Eigen::Vector2d& p) { a(p); });
   }
 
  private:
   /// What fixes of one type have shown.
   struct Receiver {
     NoiseScale scale;
-    LastingErrorModels lasting{{5.0, 15.0, 50.0}};  // s: multipath and code smoothing (Misra and Enge 2006, ch. 5)
+    LastingErrorModels lasting{{5.0, 15.0, 50.0}, 0.9};  // s: multipath and code smoothing (Misra and Enge 2006, ch. 5)
   };
   /// What of the receiver's Gauss-Markov error a fix begins with.
   struct Bias {
@@ -113,6 +108,8 @@ class GnssPositionControl {
   [[nodiscard]] Bias bias_of(const Queued& fix) const;
   [[nodiscard]] Measurement<3> measurement(const Filter& filter, const Queued& fix, const Bias& bias) const;
   [[nodiscard]] LastingError lasting(FixType type) const;
+  /// Of the errors, over the claimed variance; at least one.
+  [[nodiscard]] double variance_factor(FixType type) const;
   void set_noise(Filter& filter, const Bias& bias) const;
   void set_bias(Filter& filter, const Bias& bias);
   void begin(Filter& filter, const Bias& bias) const;
@@ -121,7 +118,7 @@ class GnssPositionControl {
   [[nodiscard]] bool heavy_tailed(FixType type) const {
     return !config_.facts.has_imu && type != FixType::kRtkFixed && type != FixType::kRtkFloat;
   }
-  AidingRecord use_heavy_tailed(Filter& filter, const Queued& fix, Bias bias);
+  AidingRecord use_heavy_tailed(Filter& filter, const Queued& fix, const Bias& bias);
   AidingRecord use_level(Filter& filter, const Queued& fix, const Bias& bias);
   AidingRecord decide(Filter& filter, const Queued& fix, const Bias& bias, const AidingRecord& rejected);
   [[nodiscard]] bool jumped_back(const Filter& filter, const Queued& fix, const Bias& bias) const;
@@ -142,10 +139,6 @@ class GnssPositionControl {
   int64_t displaced_since_us_ = 0;
   double back_ = 0.0;  // logarithm of the odds that it is no longer displaced
   bool height_displaced_ = false;
-  ErrorTime error_time_;                           // of code receivers
-  Eigen::Vector2d way_ = Eigen::Vector2d::Zero();  // m, gone without what fixes have corrected
-  double way_std_ = 0.0, last_spread_ = 0.0;   // m, grown with the way; m2, variance of the place after the last fix
-  std::optional<Eigen::Vector2d> last_place_;  // m, after the last of them
 };
 
 }  // namespace roadfix::navigation

@@ -10,8 +10,6 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr double kAxes = 2.0;
-// Prior of the model in which nothing lasts; the others have the rest in equal parts.
-constexpr double kWhite = 0.9;
 // Least share: with none it could not be scaled where it turns out to be more, (N.5.12).
 constexpr double kLeast = 1e-4;
 constexpr double kLeastWeight = -100.0;  // logarithm, against the best model
@@ -21,25 +19,39 @@ constexpr double kMostRatio = 16.0;  // one fix counts at most as four sigma, at
 
 }  // namespace
 
-LastingError LastingErrorModels::mean() const {
+std::array<double, LastingErrorModels::kModels> LastingErrorModels::weights() const {
   std::array<double, kModels> log_weight{};
   for (size_t i = 0; i < kModels; ++i) {
-    log_weight[i] = std::log(i == 0 ? kWhite : (1.0 - kWhite) / (kModels - 1.0));
+    log_weight[i] = std::log(i == 0 ? white_ : (1.0 - white_) / (kModels - 1.0));
     // Likelihood at the model's own best scale.
     if (values_ > 0.0)
       log_weight[i] -=
           0.5 * values_ * (models_[i].log_variance + std::log(std::max(models_[i].squares, kLeastSquares)));
   }
   const double most = *std::max_element(log_weight.begin(), log_weight.end());
-  double total = 0.0, share = 0.0, driven = 0.0;
+  double total = 0.0;
+  for (double& w : log_weight) total += w = std::exp(std::max(w - most, kLeastWeight));
+  for (double& w : log_weight) w /= total;
+  return log_weight;
+}
+
+LastingError LastingErrorModels::mean() const {
+  const std::array<double, kModels> weight = weights();
+  double share = 0.0, driven = 0.0;
   for (size_t i = 0; i < kModels; ++i) {
-    const double weight = std::exp(std::max(log_weight[i] - most, kLeastWeight));
     const LastingError e = assumed(i);
-    total += weight;
-    share += weight * e.share;
-    driven += weight * e.share * e.rate;
+    share += weight[i] * e.share;
+    driven += weight[i] * e.share * e.rate;
   }
-  return {std::max(share / total, kLeast), driven / share};
+  return {std::max(share, kLeast), driven / share};
+}
+
+double LastingErrorModels::variance_factor() const {
+  if (values_ <= 0.0) return 1.0;
+  const std::array<double, kModels> weight = weights();
+  double factor = 0.0;
+  for (size_t i = 0; i < kModels; ++i) factor += weight[i] * models_[i].squares;
+  return factor;
 }
 
 void LastingErrorModels::add(const WayFix& fix) {

@@ -32,13 +32,16 @@ class LastingErrorModels {
   using Times = std::array<double, 3>;  ///< s
   static constexpr size_t kModels = 1 + kShares.size() * std::tuple_size_v<Times>;
 
-  explicit LastingErrorModels(const Times& times) : times_(times) {}
+  /// `white`: prior of the model in which nothing lasts; the others have the rest in equal parts.
+  LastingErrorModels(const Times& times, double white) : times_(times), white_(white) {}
 
   /// The next fix is compared with none before it.
   void begin_anew() { t_us_ = 0; }
   void add(const WayFix& fix);
   /// Of the models as likely as each is.
   [[nodiscard]] LastingError mean() const;
+  /// Variance of the errors over the claimed one, by the same weights.
+  [[nodiscard]] double variance_factor() const;
 
   template <class Archive>
   void serialise(Archive& a) {
@@ -63,7 +66,10 @@ class LastingErrorModels {
     return {kShares[(i - 1) / times_.size()], 1.0 / times_[(i - 1) % times_.size()]};
   }
 
+  [[nodiscard]] std::array<double, kModels> weights() const;
+
   Times times_;
+  double white_;
   int64_t t_us_ = 0;
   Eigen::Vector2d moved_ = Eigen::Vector2d::Zero();  // m, by all fixes since the first
   double values_ = 0.0;                              // how many values the means are of

@@ -48,7 +48,7 @@ class GnssVelocityControl {
   Gates gates_;
   NoiseScale scale_;
   SmoothingTime smoothing_;
-  LastingErrorModels models_{{0.5, 2.0, 8.0}};  // s: filters of receivers, and multipath of a moving antenna
+  LastingErrorModels models_{{0.5, 2.0, 8.0}, 0.9};  // s: filters of receivers, and multipath of a moving antenna
   int rejected_ = 0;
   int64_t last_us_ = 0;
 };

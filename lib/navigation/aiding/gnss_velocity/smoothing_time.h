@@ -1,6 +1,6 @@
 /// With which time constant has a receiver low-pass filtered its velocities? Posterior probabilities of those that
-/// VelocityLag carries, by the innovations of velocities, (N.5.15) of MODEL.md. Before accelerations have shown it, what
-/// they differ by is noise of a velocity. Where the latency is unknown too, each time constant has its own, (N.5.16).
+/// VelocityLag carries, by the innovations of velocities, (N.5.14) of MODEL.md. Before accelerations have shown it, what
+/// they differ by is noise of a velocity. Where the latency is unknown too, each time constant has its own, (N.5.15).
 #pragma once
 
 #include "navigation/measurement.h"
