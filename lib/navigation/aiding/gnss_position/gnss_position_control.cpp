@@ -24,9 +24,7 @@ constexpr double kWheelTime = 0.25;    // s, likewise, of a car without an imu: 
 constexpr LastingErrorModels::Times kStreetTimes = {3.0, 10.0, 30.0};  // s
 constexpr double kStreetWhite = 0.1;
 constexpr double kSettled = 0.1;  // of a fix's sigma: less is over
-// m: how far off a receiver without a fixed phase may come back from an outage, level and up; how far off a displaced one
-// typically is.
-constexpr double kReturnLevel = 3.0, kReturnUp = 6.0;
+// m: how far off a displaced receiver typically is, and one without a fixed phase that comes back from an outage.
 constexpr double kDisplacement = 5.0;
 constexpr double kDisplacedPrior = 0.01;    // of a run of rejected fixes
 constexpr double kDisplacedWalk = 0.5;      // m/sqrt(s), of a displacement
@@ -72,7 +70,7 @@ void settle(Filter& filter, const Queued& fix) {
   if (s.gnss_returns() && gnss_return_size(s) < kSettled * std::sqrt(fix.cov(0, 0))) end_gnss_return(filter);
 }
 
-const Eigen::Vector3d kReturn(kReturnLevel, kReturnLevel, kReturnUp);
+const Eigen::Vector3d kReturn(kDisplacement, kDisplacement, 2.0 * kDisplacement);
 
 }  // namespace
 
