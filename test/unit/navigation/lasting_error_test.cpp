@@ -18,10 +18,9 @@ struct Receiver {
   double drift = 0.02;                           // m/sqrt(s), of the way, as claimed
 };
 
-LastingErrorModels seen(const Receiver& r, double duration, unsigned seed) {
+LastingErrorModels seen(const Receiver& r, double duration, unsigned seed, LastingErrorModels models = kAnyReceiver) {
   std::mt19937 rng(seed);
   std::normal_distribution<double> n;
-  LastingErrorModels models = kAnyReceiver;
   const double decay = std::exp(-r.interval / r.time), lasting = std::sqrt(r.share) * r.sigma;
   const double white = std::sqrt(1.0 - r.share) * r.sigma;
   const auto pair = [&] {
@@ -78,6 +77,19 @@ TEST_CASE("errors that last are found to last, and for how long") {
     CHECK(quick.rate > 0.1);
     CHECK(slow.rate < 0.05);
   }
+}
+
+TEST_CASE("beside wheels alone errors are taken to last at first, and seconds are told from half a minute") {
+  const LastingErrorModels street({3.0, 10.0, 30.0}, 0.1);
+  CHECK(street.mean().share > 0.5);
+  double quick = 0.0, slow = 0.0;
+  for (unsigned seed = 1; seed <= 11; ++seed) {
+    quick += seen({6.0, 0.8, 4.0, 6.0}, 180.0, seed, street).mean().rate / 11.0;
+    slow += seen({6.0, 0.8, 30.0, 6.0}, 300.0, seed, street).mean().rate / 11.0;
+  }
+  CAPTURE(quick, slow);
+  CHECK(quick > 0.1);
+  CHECK(slow < 0.07);
 }
 
 TEST_CASE("how much larger errors are than they claim to be is found, whether they last or not") {

@@ -18,8 +18,8 @@ constexpr LastingError kPhase = {0.03, 1.0 / 20.0};
 // The velocity of a filter that is aided is off by the same for about so long: what the driven way drifts by is a random
 // walk of twice its variance times this, and no less than a centimetre.
 constexpr double kVelocityTime = 1.0;  // s
-constexpr double kLeastDrift = 0.01;   // m/sqrt(s)
 constexpr double kWheelTime = 0.25;    // s, likewise, of a car without an imu: its speed is measured anew each time
+constexpr double kLeastDrift = 0.01;   // m/sqrt(s)
 // A code receiver without an imu beside it: from multipath of a moving car to smoothing, and hardly ever white.
 constexpr LastingErrorModels::Times kStreetTimes = {3.0, 10.0, 30.0};  // s
 constexpr double kStreetWhite = 0.1;
