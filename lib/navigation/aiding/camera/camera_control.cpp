@@ -12,8 +12,8 @@ namespace {
 // Passes of (N.6.17), the share of its standard deviations by which the last one may move, and the least of those.
 constexpr int kMostPasses = 8;
 constexpr double kSettled = 0.3, kLeastVariance = 1e-16;
-constexpr int kEnoughTracks = 3;       // of an update, to judge the camera by
-constexpr double kShortestStep = 0.2;  // s, at most, that one picture counts for in the trial
+constexpr int kEnoughTracks = 3;      // of an update, to judge the camera by
+constexpr double kLongestStep = 0.2;  // s, at most, that one picture counts for: two bad ones make no bad camera
 
 // s, between the two pictures of a flow, at least and where there are enough, and of the newer one.
 constexpr double kLeastFlowSpan = 0.25, kFlowSpan = 0.45, kFlowAge = 0.3;
@@ -132,9 +132,14 @@ std::optional<CameraControl::Flow> CameraControl::flow(int64_t t_us, const Mean&
   return Flow{*middle, std::hypot(kStillMotion_px, noise)};
 }
 
-bool CameraControl::makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const {
-  // Without parallax a picture tells nothing new, and the window keeps its baseline.
-  return !picture.points.empty() && !standing && !same && t_us - pose_us_ >= micros(tuning_.pose_interval);
+/// (N.6.21): a picture without parallax tells nothing new, and the window keeps its baseline.
+bool CameraControl::makes_pose(const State& state, const SeenPicture& picture, int64_t t_us) const {
+  if (smoothing_ || state.clones.empty() || t_us - pose_us_ >= micros(tuning_.pose_interval)) return true;
+  const Clone& last = state.clones.back();
+  const Eigen::Matrix3d now = state.x.nav.q_level_imu * state.x.T_imu_camera.R(),
+                        then = last.R * state.x.T_imu_camera.R();
+  const auto parallax = tracks_.parallax(picture, last.id, now.transpose() * then);
+  return !parallax || *parallax >= tuning_.pose_parallax;
 }
 
 std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing, Filter* course) {
@@ -143,7 +148,7 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing, Fi
   const TimedPicture& now = pass_waiting();
   const SeenPicture seen = seen_picture(now.picture, left_, right_ ? &*right_ : nullptr);
   num_seen_ = static_cast<int>(seen.points.size());
-  if (!makes_pose(seen, t_us, standing, same)) {
+  if (seen.points.empty() || standing || same || !makes_pose(filter.state(), seen, t_us)) {
     tracks_.pass(seen);
     return std::nullopt;
   }
@@ -289,7 +294,7 @@ std::optional<State> CameraControl::iterate(const State& prior) {
 void CameraControl::judge(double dt_s) {
   const TrackCounts& counts = update_.counts();
   if (counts.tried() < kEnoughTracks) return;
-  const double step = std::min(dt_s, kShortestStep);
+  const double step = std::min(dt_s, kLongestStep);
   const double misfit = update_.misfit();
   const double share = 1.0 - std::exp(-step / tuning_.judged_over);
   misfit_ += share * (misfit - misfit_);

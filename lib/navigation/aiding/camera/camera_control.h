@@ -91,7 +91,7 @@ class CameraControl {
 
   /// Moves the first picture that waits to those that were used, of which the last half second stays.
   const TimedPicture& pass_waiting();
-  [[nodiscard]] bool makes_pose(const SeenPicture& picture, int64_t t_us, bool standing, bool same) const;
+  [[nodiscard]] bool makes_pose(const State& state, const SeenPicture& picture, int64_t t_us) const;
   void add_pose(Filter& filter, int64_t id, int64_t t_us) const;
   void choose_tracks(const State& state, bool full);
   void try_tracks(const State& state, const State* course = nullptr);

@@ -6,15 +6,17 @@
 namespace roadfix::navigation {
 
 struct CameraTuning {
-  int poses = 12;               ///< of the window
-  double pose_interval = 0.07;  ///< s between two of them, at least
-  int tracks_per_update = 40;   ///< finished tracks used at one time, longest first
-  double unfit_above = 3.0;     ///< mean misfit of pictures, (N.6.14), that no good camera has
-  double fit_below = 1.5;       ///< likewise, that a good one has
-  double judged_over = 1.0;     ///< s, memory of that mean
-  double trial = 1.0;           ///< s of pictures that must fit before the camera is used, the first time
-  double trial_again = 5.0;     ///< s, after it was found unfit
-  double iterate_above = 4.0;   ///< mean square of residuals over noise, beyond which an update is iterated, (N.6.17)
+  int poses = 12;  ///< of the window
+  /// rad, median of what tracks move between two of them besides the camera's turn, and s after which there is one all
+  /// the same, (N.6.21)
+  double pose_parallax = 0.06, pose_interval = 0.4;
+  int tracks_per_update = 40;  ///< finished tracks used at one time, longest first
+  double unfit_above = 3.0;    ///< mean misfit of pictures, (N.6.14), that no good camera has
+  double fit_below = 1.5;      ///< likewise, that a good one has
+  double judged_over = 1.0;    ///< s, memory of that mean
+  double trial = 1.0;          ///< s of pictures that must fit before the camera is used, the first time
+  double trial_again = 5.0;    ///< s, after it was found unfit
+  double iterate_above = 4.0;  ///< mean square of residuals over noise, beyond which an update is iterated, (N.6.17)
   /// rad and m, of the camera's mounting, whatever the calibration claims: a bracket that was knocked is off by two
   /// degrees, and a prior that is a little too wide costs nothing, as the fixes show the rest in seconds (N.6.15).
   double turn_floor = 0.009, place_floor = 0.02;
@@ -36,6 +38,7 @@ void visit(TrackTuning& c, Visitor& v) {
 template <class Visitor>
 void visit(CameraTuning& c, Visitor& v) {
   v.integer("poses", c.poses, 4, 16);
+  v.number("pose_parallax_rad", c.pose_parallax, 0.0, 1.0);
   v.number("pose_interval_s", c.pose_interval, 0.0, 1.0);
   v.integer("tracks_per_update", c.tracks_per_update, 5, 200);
   v.number("unfit_above", c.unfit_above, 1.0, 100.0);

@@ -4,6 +4,12 @@
 
 namespace roadfix::navigation {
 
+namespace {
+
+constexpr size_t kEnoughCommon = 10;  // tracks, for a median
+
+}  // namespace
+
 void TrackStore::pass(const SeenPicture& picture) {
   auto point = picture.points.begin();
   for (Track& track : tracks_) {
@@ -28,6 +34,23 @@ void TrackStore::add(const SeenPicture& picture, int64_t clone) {
                                                         point.sigma_px, place->walk_px2, point.right_sigma_px};
     place->walk_px2 = 0.0;
   }
+}
+
+std::optional<double> TrackStore::parallax(const SeenPicture& now, int64_t clone,
+                                           const Eigen::Matrix3d& R_now_then) const {
+  std::vector<double> moved;
+  auto point = now.points.begin();
+  for (const Track& track : tracks_) {
+    if (!track.alive || track.count == 0 || track.sightings().back().clone != clone) continue;
+    while (point != now.points.end() && point->track < track.id) ++point;
+    if (point == now.points.end() || point->track != track.id) continue;
+    const Eigen::Vector3d then = R_now_then * track.sightings().back().left.z.homogeneous();
+    moved.push_back((point->left.z - then.head<2>() / then.z()).norm());
+  }
+  if (moved.size() < kEnoughCommon) return std::nullopt;
+  const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);
+  std::nth_element(moved.begin(), middle, moved.end());
+  return *middle;
 }
 
 void TrackStore::forget_clone(int64_t clone) {

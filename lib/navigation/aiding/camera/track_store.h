@@ -57,6 +57,10 @@ class TrackStore {
   void add(const SeenPicture& picture, int64_t clone);
   /// A picture from which no clone was made: tracks end in it, and errors walk on.
   void pass(const SeenPicture& picture);
+  /// What tracks have moved since this clone besides the turn `R_now_then` (then's camera axes to now's), median, rad;
+  /// nothing where few are common.
+  [[nodiscard]] std::optional<double> parallax(const SeenPicture& now, int64_t clone,
+                                               const Eigen::Matrix3d& R_now_then) const;
   /// Forgets what was seen from this clone.
   void forget_clone(int64_t clone);
   /// Drops tracks that have ended.

@@ -77,11 +77,11 @@ TEST_CASE("a slow turn that all tracks pretend does not pass for the camera's ow
   CameraRun run;
   run.drift = 1.5e-5;  // the roll that drawn pictures pretend, about every axis
   run.tuning.drift = 1.5e-5;
-  const Claims modelled = claims(8, run);
+  const Claims modelled = claims(16, run);
   print("drift, modelled", modelled);
   CHECK(modelled.attitude.ratio() < 1.4);
   run.tuning.drift = 0.0;
-  const Claims ignored = claims(8, run);
+  const Claims ignored = claims(16, run);
   print("drift, ignored", ignored);
   CHECK(ignored.attitude.ratio() > 1.7);
 }
@@ -197,11 +197,13 @@ Turned mounted_anyhow(int drives, double iterate_above) {
 }  // namespace
 
 TEST_CASE("a camera whose mounting is known to 8 degrees is found by iterated updates") {
-  const Turned iterated = mounted_anyhow(10, CameraTuning().iterate_above);
-  CHECK(iterated.fit == 10);
-  CHECK(iterated.turn.ratio() < 5.0);
-  CHECK(iterated.velocity.ratio() < 6.0);
-  const Turned single = mounted_anyhow(10, 1e9);
-  CHECK(single.turn.ratio() > 50.0);
-  CHECK(single.velocity.ratio() > 50.0);
+  constexpr int kDrives = 24;
+  const Turned iterated = mounted_anyhow(kDrives, CameraTuning().iterate_above);
+  CHECK(iterated.fit >= kDrives - 4);  // a few are still on trial after ten seconds
+  CHECK(iterated.turn.ratio() < 9.0);
+  CHECK(iterated.velocity.ratio() < 12.0);
+  const Turned single = mounted_anyhow(kDrives, 1e9);
+  CHECK(single.fit < kDrives / 2);
+  CHECK(single.turn.ratio() > 40.0);
+  CHECK(single.velocity.ratio() > 30.0);
 }
