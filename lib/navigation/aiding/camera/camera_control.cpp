@@ -134,7 +134,8 @@ std::optional<CameraControl::Flow> CameraControl::flow(int64_t t_us, const Mean&
 
 /// (N.6.21): a picture without parallax tells nothing new, and the window keeps its baseline.
 bool CameraControl::makes_pose(const State& state, const SeenPicture& picture, int64_t t_us) const {
-  if (smoothing_ || state.clones.empty() || t_us - pose_us_ >= micros(tuning_.pose_interval)) return true;
+  if (smoothing_ || fitness_ != CameraFitness::kFit || hardly_known(state)) return true;
+  if (state.clones.empty() || t_us - pose_us_ >= micros(tuning_.pose_interval)) return true;
   const Clone& last = state.clones.back();
   const Eigen::Matrix3d now = state.x.nav.q_level_imu * state.x.T_imu_camera.R(),
                         then = last.R * state.x.T_imu_camera.R();

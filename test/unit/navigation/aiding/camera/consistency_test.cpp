@@ -62,7 +62,7 @@ TEST_CASE("camera and imu claim what they are worth on tracks whose errors walk"
     const Claims c = claims(20, run);
     print(two_eyes ? "two eyes" : "one eye", c);
     CHECK(c.all.ratio() > 0.7);  // tracks differ, and Student's t takes the good ones for worse than they are
-    CHECK(c.all.ratio() < 1.3);
+    CHECK(c.all.ratio() < 1.2);
     CHECK(c.lens.ratio() < 1.6);
   }
   run.two_eyes = false;
@@ -70,7 +70,7 @@ TEST_CASE("camera and imu claim what they are worth on tracks whose errors walk"
   run.tuning.tracks.refuse = run.tuning.unfit_above = run.tuning.fit_below = 1e6;
   const Claims white = claims(10, run);
   print("taken for white", white);
-  CHECK(white.all.ratio() > 1.6);
+  CHECK(white.all.ratio() > 1.4);
 }
 
 TEST_CASE("a slow turn that all tracks pretend does not pass for the camera's own") {
@@ -79,11 +79,11 @@ TEST_CASE("a slow turn that all tracks pretend does not pass for the camera's ow
   run.tuning.drift = 1.5e-5;
   const Claims modelled = claims(16, run);
   print("drift, modelled", modelled);
-  CHECK(modelled.attitude.ratio() < 1.4);
+  CHECK(modelled.attitude.ratio() < 1.2);
   run.tuning.drift = 0.0;
   const Claims ignored = claims(16, run);
   print("drift, ignored", ignored);
-  CHECK(ignored.attitude.ratio() > 1.7);
+  CHECK(ignored.attitude.ratio() > 1.3);
 }
 
 namespace {
@@ -157,6 +157,8 @@ TEST_CASE("a camera that is wrong is found unfit, and costs nothing") {
   turned.camera_turn_std = CameraTuning().turn_floor;
   check("turned by two degrees", turned);
   const Faulty claimed = with(turned);
+  CHECK(claimed.unfit == 0);
+  CHECK(claimed.velocity_rms < 0.5 * without.velocity_rms);
   // Called exact, the same mounting is either found out or costs most of what the camera gives.
   turned.camera_turn_std = 0.0;
   const Faulty exact = with(turned);
@@ -199,8 +201,8 @@ Turned mounted_anyhow(int drives, double iterate_above) {
 TEST_CASE("a camera whose mounting is known to 8 degrees is found by iterated updates") {
   constexpr int kDrives = 24;
   const Turned iterated = mounted_anyhow(kDrives, CameraTuning().iterate_above);
-  CHECK(iterated.fit >= kDrives - 4);  // a few are still on trial after ten seconds
-  CHECK(iterated.turn.ratio() < 9.0);
+  CHECK(iterated.fit >= kDrives - 2);  // one may still be on trial after ten seconds
+  CHECK(iterated.turn.ratio() < 6.0);
   CHECK(iterated.velocity.ratio() < 12.0);
   const Turned single = mounted_anyhow(kDrives, 1e9);
   CHECK(single.fit < kDrives / 2);
