@@ -3,6 +3,12 @@
 #include <cmath>
 
 namespace roadfix {
+namespace {
+
+constexpr double kNoLengths = 1e3;  ///< m: a sigma that says nothing of a way's length
+
+}  // namespace
+
 void MotionSum::add(const MotionStep& step) {
   const MovedPlanar moved = moved_by(motion, step.motion);
   motion = moved.pose;
@@ -53,6 +59,12 @@ void ChannelCalibration::learn(const MotionSum& sum, const Planar& reference, co
   x_ += PHt * llt.solve(difference_of(reference, sum.motion));
   P_ -= PHt * llt.solve(PHt.transpose());
   P_ = (0.5 * (P_ + P_.transpose())).eval();
+}
+
+void ChannelCalibration::learn_turns(MotionSum sum, const Planar& reference, Eigen::Matrix3d R) {
+  sum.by_calibration.col(kScale).setZero();
+  R(0, 0) += kNoLengths * kNoLengths;
+  learn(sum, reference, R);
 }
 
 void ChannelCalibration::forget_scale() {

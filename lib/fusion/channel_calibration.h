@@ -68,6 +68,8 @@ class ChannelCalibration {
   [[nodiscard]] MotionStep corrected(const Planar& measured, double dt) const;
   /// Takes in that the motions of `sum`, corrected with today's mean, were `reference`, which has covariance R, (F.4.3).
   void learn(const MotionSum& sum, const Planar& reference, const Eigen::Matrix3d& R);
+  /// The same of what turns it alone: from a reference whose lengths are no better.
+  void learn_turns(MotionSum sum, const Planar& reference, Eigen::Matrix3d R);
   /// Another map: its lengths may have another scale; the old one is the best guess.
   void forget_scale();
   /// Log of measured over true length, of a channel without metric lengths.

@@ -132,19 +132,24 @@ void Fusion::judge() {
   failover_.judge(ins_bad, !contradict(kIns, kVo) && !contradict(kIns, kWheel), channels_, t_us_);
 }
 
-/// While fixes hold the INS's pose, it shows what the others' motions have wrong all along, and how noisy they are.
+/// While fixes hold the INS's pose, it shows what the others' motions have wrong all along, and how noisy they are. Without
+/// it vision, whose yaw does not drift, shows what turns the wheels.
 void Fusion::calibrate() {
   const double window = Witnesses::kCalibration * Witnesses::kSpacing;
   if (epochs_ % Witnesses::kShort == 1) {  // each shows what of their difference the other does not explain
     adapt(FusionChannel::kVo, FusionChannel::kWheel);
     adapt(FusionChannel::kWheel, FusionChannel::kVo);
   }
+  const bool held = failover_.follows() && failover_.gnss_for(t_us_) >= window;
   const bool learns = ++epochs_ >= Witnesses::kCalibration;
   if (learns) epochs_ = 0;
-  if (!failover_.follows() || failover_.gnss_for(t_us_) < window) return;
-  for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) {
-    if (learns) learn(c);
-    if (epochs_ % Witnesses::kShort == 0) adapt(c, FusionChannel::kIns);
+  if (held) {
+    for (const FusionChannel c : {FusionChannel::kVo, FusionChannel::kWheel}) {
+      if (learns) learn(c);
+      if (epochs_ % Witnesses::kShort == 0) adapt(c, FusionChannel::kIns);
+    }
+  } else if (learns && !channel(FusionChannel::kIns).alive(t_us_)) {
+    learn_turns();
   }
 }
 
@@ -160,6 +165,14 @@ void Fusion::learn(FusionChannel c) {
   }
   if (witnesses_.agreement(FusionChannel::kIns, c) != WitnessAgreement::kContradict)
     calibration.learn(sum_of(*own), ins->motion, ins->S);
+}
+
+void Fusion::learn_turns() {
+  const auto vision = witnesses_.window(FusionChannel::kVo, Witnesses::kCalibration, channels_);
+  const auto wheels = witnesses_.window(FusionChannel::kWheel, Witnesses::kCalibration, channels_);
+  const bool agree = witnesses_.agreement(FusionChannel::kVo, FusionChannel::kWheel) == WitnessAgreement::kAgree;
+  if (!vision || !wheels || !agree || vision->motion.head<2>().norm() < kLeastWay) return;
+  at(FusionChannel::kWheel).calibration().learn_turns(sum_of(*wheels), vision->motion, vision->S);
 }
 
 void Fusion::adapt(FusionChannel c, FusionChannel reference) {

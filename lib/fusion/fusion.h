@@ -87,6 +87,7 @@ class Fusion {
   void judge();
   void calibrate();
   void learn(FusionChannel c);
+  void learn_turns();
   void adapt(FusionChannel c, FusionChannel reference);
   void watch_frozen();
   void watch_vision(const ChannelSample& sample);

@@ -6,6 +6,7 @@
 
 #include "channel_faults.h"
 #include "geometry/euler.h"
+#include "geometry/so3.h"
 
 namespace roadfix {
 namespace {
@@ -173,6 +174,37 @@ TEST_CASE("darkness without GNSS: wheels carry, vision is asked to start at the 
   CHECK(just_back == ChannelState::kOnTrial);
   CHECK(later == ChannelState::kGood);
   CHECK(local_error < 12.0);  // over 80 s with wheels 1 % long: their scale is nobody's to know here
+}
+
+/// What POSE_LOCAL turns wrongly from 45 s to 85 s, rad, by wheels whose yaw drifts by 1 mrad/s, without an INS.
+double turned_wrongly(bool vision_before) {
+  const Tunnel t;
+  test::VoNoise wheels;
+  wheels.rate_hz = 20.0;
+  wheels.fault = [&](double, Planar& motion) {
+    motion.z() += 1e-3 / wheels.rate_hz;
+    return true;
+  };
+  std::vector<std::vector<StreamEvent>> streams{wheel_stream(t.drive, wheels, 1)};
+  if (vision_before) streams.push_back(vo_stream(t.drive, t.vo, 1));
+  std::vector<StreamEvent> events = test::merged(streams);
+  const double lost = 45.0, end = 85.0;
+  std::erase_if(events,
+                [&](const StreamEvent& e) { return e.sample.channel == FusionChannel::kVo && time_of(t, e) > lost; });
+  Fusion fusion({});
+  std::optional<double> before;
+  double error = 0.0;
+  run(fusion, events, [&](const FusedPoses& f, const StreamEvent& e) {
+    if (time_of(t, e) > end) return;
+    error = planar_error(t.drive, f.local).error.z();
+    if (!before && time_of(t, e) > lost) before = error;
+  });
+  return std::abs(wrap_angle(error - before.value()));
+}
+
+TEST_CASE("without a receiver vision shows how the wheels' yaw drifts: it helps after vision is lost") {
+  CHECK(turned_wrongly(false) > 0.03);
+  CHECK(turned_wrongly(true) < 0.012);
 }
 
 TEST_CASE("the order of samples of one time makes no difference that counts") {
