@@ -21,15 +21,6 @@ constexpr double kLeastWay = 2.0;       ///< m, of a window that shows a scale
 constexpr double kRestartAfter = 0.5;   ///< s, for which vision must be lost
 constexpr double kRawScale = 1.0;       ///< sigma of a log scale of which nothing is known
 
-MotionSum sum_of(const WindowMotion& window) {
-  MotionSum sum;
-  sum.motion = window.motion;
-  sum.Q = window.noise;
-  sum.by_calibration = window.by_calibration;
-  sum.dt = window.dt;
-  return sum;
-}
-
 }  // namespace
 
 Fusion::Fusion(const FusionConfig& config)
@@ -164,7 +155,7 @@ void Fusion::learn(FusionChannel c) {
     return;
   }
   if (witnesses_.agreement(FusionChannel::kIns, c) != WitnessAgreement::kContradict)
-    calibration.learn(sum_of(*own), ins->motion, ins->S);
+    calibration.learn(*own, ins->motion, ins->S);
 }
 
 void Fusion::learn_turns() {
@@ -172,14 +163,14 @@ void Fusion::learn_turns() {
   const auto wheels = witnesses_.window(FusionChannel::kWheel, Witnesses::kCalibration, channels_);
   const bool agree = witnesses_.agreement(FusionChannel::kVo, FusionChannel::kWheel) == WitnessAgreement::kAgree;
   if (!vision || !wheels || !agree || vision->motion.head<2>().norm() < kLeastWay) return;
-  at(FusionChannel::kWheel).calibration().learn_turns(sum_of(*wheels), vision->motion, vision->S);
+  at(FusionChannel::kWheel).calibration().learn_turns(*wheels, vision->motion, vision->S);
 }
 
 void Fusion::adapt(FusionChannel c, FusionChannel reference) {
   const auto other = witnesses_.window(reference, Witnesses::kShort, channels_);
   const auto own = witnesses_.window(c, Witnesses::kShort, channels_);
   if (!other || !own || witnesses_.agreement(reference, c) != WitnessAgreement::kAgree) return;
-  at(c).adapt(difference_of(other->motion, own->motion), own->motion, own->dt, other->S + own->S - own->noise);
+  at(c).adapt(difference_of(other->motion, own->motion), own->motion, own->dt, other->S + own->S - own->Q);
 }
 
 /// A pose that is repeated although its own velocity, or another channel, says that the vehicle moves.

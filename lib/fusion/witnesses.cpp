@@ -65,8 +65,8 @@ std::optional<WindowMotion> Witnesses::window(FusionChannel c, int epochs, const
   const MotionStep step = channels[i].calibration().corrected(measured, m.dt);
   m.motion = step.motion;
   m.by_calibration = step.by_calibration;
-  m.noise = channels[i].window_noise(step.motion, m.dt);
-  m.S = m.noise + step.by_calibration * channels[i].calibration().covariance() * step.by_calibration.transpose();
+  m.Q = channels[i].window_noise(step.motion, m.dt);
+  m.S = m.covariance(channels[i].calibration().covariance());
   return m;
 }
 

@@ -33,12 +33,9 @@ struct Epoch {
   }
 };
 
-struct WindowMotion {
-  Planar motion = Planar::Zero();                   ///< corrected, in the axes of its start
-  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< its covariance
-  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();  ///< of S what is new in the window
-  MotionByCalibration by_calibration = MotionByCalibration::Zero();
-  double dt = 0.0;
+/// A corrected motion, in the axes of its start.
+struct WindowMotion : MotionSum {
+  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< its covariance; Q is what is new in the window
 };
 
 /// The pairs INS and vision, INS and wheels, vision and wheels.
