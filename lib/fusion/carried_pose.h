@@ -34,7 +34,7 @@ class CarriedPose {
   Planar pose_ = Planar::Zero();  ///< where sum_ begins
   Eigen::Matrix3d P_ = Eigen::Matrix3d::Zero();
   double height_ = 0.0, height_variance_ = 0.0;
-  MotionSum sum_;
+  MotionStep sum_;
   double way_ = 0.0;                        ///< m, of sum_
   FusionChannel by_ = FusionChannel::kIns;  ///< whose calibration sum_ depends on
 };

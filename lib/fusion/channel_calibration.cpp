@@ -9,7 +9,7 @@ constexpr double kNoLengths = 1e3;  ///< m: a sigma that says nothing of a way's
 
 }  // namespace
 
-void MotionSum::add(const MotionStep& step) {
+void MotionStep::add(const MotionStep& step) {
   const MovedPlanar moved = moved_by(motion, step.motion);
   motion = moved.pose;
   Q = moved_covariance(moved, Q, step.Q);
@@ -18,7 +18,7 @@ void MotionSum::add(const MotionStep& step) {
   dt += step.dt;
 }
 
-Eigen::Matrix3d MotionSum::covariance(const CalibrationMatrix& P) const {
+Eigen::Matrix3d MotionStep::covariance(const CalibrationMatrix& P) const {
   return Q + by_calibration * P * by_calibration.transpose();
 }
 
@@ -50,7 +50,7 @@ MotionStep ChannelCalibration::corrected(const Planar& measured, double dt) cons
   return step;
 }
 
-void ChannelCalibration::learn(const MotionSum& sum, const Planar& reference, const Eigen::Matrix3d& R) {
+void ChannelCalibration::learn(const MotionStep& sum, const Planar& reference, const Eigen::Matrix3d& R) {
   const MotionByCalibration& H = sum.by_calibration;
   const Eigen::Matrix<double, kCalibration, 3> PHt = P_ * H.transpose();
   const Eigen::Matrix3d S = H * PHt + sum.Q + R;
@@ -61,7 +61,7 @@ void ChannelCalibration::learn(const MotionSum& sum, const Planar& reference, co
   P_ = (0.5 * (P_ + P_.transpose())).eval();
 }
 
-void ChannelCalibration::learn_turns(MotionSum sum, const Planar& reference, Eigen::Matrix3d R) {
+void ChannelCalibration::learn_turns(MotionStep sum, const Planar& reference, Eigen::Matrix3d R) {
   sum.by_calibration.col(kScale).setZero();
   R(0, 0) += kNoLengths * kNoLengths;
   learn(sum, reference, R);

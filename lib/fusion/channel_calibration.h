@@ -34,22 +34,14 @@ using CalibrationVector = Eigen::Matrix<double, kCalibration, 1>;
 using CalibrationMatrix = Eigen::Matrix<double, kCalibration, kCalibration>;
 using MotionByCalibration = Eigen::Matrix<double, 3, kCalibration>;
 
-/// One motion of dt seconds with the covariance of what is new in it, in the axes of its start.
+/// A motion of dt seconds, or several one after the other, in the axes of its start, with the covariance of what is new in
+/// it (F.3.2).
 struct MotionStep {
   Planar motion = Planar::Zero();
   Eigen::Matrix3d Q = Eigen::Matrix3d::Zero();
   MotionByCalibration by_calibration = MotionByCalibration::Zero();
   double rise = 0.0;  ///< m
   double dt = 0.0;    ///< s
-};
-
-/// Motions one after the other: from the start's pose on, in its axes (F.3.2).
-struct MotionSum {
-  Planar motion = Planar::Zero();
-  Eigen::Matrix3d Q = Eigen::Matrix3d::Zero();
-  MotionByCalibration by_calibration = MotionByCalibration::Zero();
-  double rise = 0.0;
-  double dt = 0.0;
 
   void add(const MotionStep& step);
   /// With the error of the calibration, whose covariance is P.
@@ -67,9 +59,9 @@ class ChannelCalibration {
   /// The motion without what is known to be wrong, (F.4.1), with its Jacobian (F.4.2).
   [[nodiscard]] MotionStep corrected(const Planar& measured, double dt) const;
   /// Takes in that the motions of `sum`, corrected with today's mean, were `reference`, which has covariance R, (F.4.3).
-  void learn(const MotionSum& sum, const Planar& reference, const Eigen::Matrix3d& R);
+  void learn(const MotionStep& sum, const Planar& reference, const Eigen::Matrix3d& R);
   /// The same of what turns it alone: from a reference whose lengths are no better.
-  void learn_turns(MotionSum sum, const Planar& reference, Eigen::Matrix3d R);
+  void learn_turns(MotionStep sum, const Planar& reference, Eigen::Matrix3d R);
   /// Another map: its lengths may have another scale; the old one is the best guess.
   void forget_scale();
   /// Log of measured over true length, of a channel without metric lengths.

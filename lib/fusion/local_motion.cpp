@@ -97,10 +97,10 @@ MotionStep LocalMotion::motion(const Channels& channels, int64_t from_us, int64_
     const PoseChannel& channel = channels[index_of(*velocity_)];
     if (channel.has_track(from_us) && from_us < channel.t_us()) {
       const int64_t known_us = std::min(to_us, channel.t_us());
-      MotionSum sum;
+      MotionStep sum;
       sum.add(channel.measured(from_us, known_us));
       if (known_us < to_us) sum.add(motion(channels, known_us, to_us));
-      return {sum.motion, sum.Q, sum.by_calibration, sum.rise, sum.dt};
+      return sum;
     }
     const double middle = seconds_between(channel.t_us(), from_us) + 0.5 * dt;
     const double lasts = std::clamp(middle, -kLongestPrediction, kLongestPrediction);

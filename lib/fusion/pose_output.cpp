@@ -55,7 +55,7 @@ Odometry carried(const FusionNow& now, const CarriedPose& pose, const Ahead& ahe
   const int64_t now_us = ahead.newest ? ahead.newest->t_us : now.t_us;
   const bool relied =
       ahead.joined && (now.channel(ahead.channel).good(now.t_us) || now.local.leader() == ahead.channel);
-  MotionSum tail;
+  MotionStep tail;
   tail.add(now.local.motion(now.channels, pose.t_us(), relied ? now.t_us : now_us));
   if (relied) tail.add(now.channel(ahead.channel).corrected(ahead.motion, ahead.rise, ahead.dt));
   const MovedPlanar here = moved_by(pose.pose(), tail.motion);

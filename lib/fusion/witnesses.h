@@ -34,7 +34,7 @@ struct Epoch {
 };
 
 /// A corrected motion, in the axes of its start.
-struct WindowMotion : MotionSum {
+struct WindowMotion : MotionStep {
   Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< its covariance; Q is what is new in the window
 };
 

@@ -38,7 +38,7 @@ ChannelCalibration learnt(const CalibrationVector& truth, Draws& draws) {
     const Eigen::Vector2d aside = way.z() * Eigen::Vector2d(-std::sin(0.5 * way.z()), std::cos(0.5 * way.z()));
     measured << std::exp(truth(kScale)) * (Eigen::Rotation2Dd(bend) * (way.head<2>() - truth(kArm) * aside)), turn;
     const MotionStep step = c.corrected(measured, dt);
-    MotionSum sum;
+    MotionStep sum;
     sum.add(step);
     sum.Q = Eigen::Vector3d(1e-4, 1e-4, 1e-6).asDiagonal();
     c.learn(sum, way + Planar(draws.normal(0.02), draws.normal(0.02), draws.normal(1e-3)),
@@ -66,7 +66,7 @@ TEST_CASE("Jacobian of a corrected motion, and of a sum of them, by the calibrat
   Draws draws(6);
   const auto with = [](const CalibrationVector& x, const std::vector<Planar>& steps) {
     // corrected() with a mean of x, through set_scale for the scale and learning for the rest: by hand here.
-    MotionSum sum;
+    MotionStep sum;
     for (const Planar& measured : steps) {
       const double turn = std::exp(-x(kTurns)) * (measured.z() - x(kDrift) * 0.1);
       const double bend = -x(kHeading) + 0.5 * (turn - measured.z());
@@ -80,7 +80,7 @@ TEST_CASE("Jacobian of a corrected motion, and of a sum of them, by the calibrat
   std::vector<Planar> steps;
   for (int i = 0; i < 30; ++i) steps.emplace_back(1.3 + draws.normal(0.1), draws.normal(0.02), draws.normal(0.03));
   const ChannelCalibration c(CalibrationNoise{});
-  MotionSum sum;
+  MotionStep sum;
   for (const Planar& measured : steps) sum.add(c.corrected(measured, 0.1));
   CHECK((sum.motion - with(CalibrationVector::Zero(), steps)).norm() < 1e-12);
   for (int i = 0; i < kCalibration; ++i) {
