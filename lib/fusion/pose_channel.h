@@ -104,7 +104,6 @@ class PoseChannel {
   /// By how much the last add()'s pose differs from its predecessor carried on by velocities, in its frame.
   [[nodiscard]] const Planar& correction() const { return correction_; }
   [[nodiscard]] const Eigen::Matrix3d& covariance_before() const { return P_before_; }
-  [[nodiscard]] bool was_reset() const { return was_reset_; }
   [[nodiscard]] int reset_counter() const { return reset_counter_; }
 
   template <class Self, class Visitor>
