@@ -96,7 +96,6 @@ State::State(bool camera)
       carried_(P_.rows(), 0) {
   if (!camera) return;
   clones.reserve(kMaxClones);
-  points.reserve(kMaxPoints);
 }
 
 const Clone* State::find_clone(int64_t id) const {
@@ -109,7 +108,6 @@ void State::reset(const Mean& mean, const BaseVector& variance) {
   x = mean;
   p_ref = mean.nav.position;
   clones.clear();
-  points.clear();
   size_ = base_;
   P_.setZero();
   P_.diagonal().head(base_) = variance.head(base_);
@@ -132,7 +130,6 @@ void State::adopt(const State& other, const Mean& camera, const BaseVector& vari
 
 void State::drop_clones() {
   clones.clear();
-  points.clear();
   size_ = base_;
 }
 
@@ -173,7 +170,6 @@ void State::retract(const Eigen::Ref<const Eigen::VectorXd>& d) {
     c.R = Eigen::Quaterniond(dR * c.R).normalized().toRotationMatrix();
     c.p = p_ref + dR * (c.p - p_ref) + part(d, c.at + 3);
   }
-  for (Point& p : points) p.f += part(d, p.at);
 }
 
 void State::subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y) {
@@ -260,7 +256,6 @@ void State::erase(int at, int width) {
   size_ -= width;
   const auto moved = [&](int& a) { a = a > at ? a - width : a; };
   for (Clone& c : clones) moved(c.at);
-  for (Point& p : points) moved(p.at);
 }
 
 void State::remove_clone(int64_t id) {
@@ -268,13 +263,6 @@ void State::remove_clone(int64_t id) {
   const int at = found->at;
   clones.erase(found);
   erase(at, 6);
-}
-
-void State::remove_point(int64_t track) {
-  const auto found = std::find_if(points.begin(), points.end(), [&](const Point& p) { return p.track == track; });
-  const int at = found->at;
-  points.erase(found);
-  erase(at, 3);
 }
 
 void State::add_clone(int64_t id, const Eigen::Vector3d& rate, double jitter) {
@@ -314,7 +302,6 @@ void State::digest(Digest& digest) const {
     digest.add(c.R);
     digest.add(c.p);
   }
-  for (const Point& p : points) digest.add(p.f);
   digest.add(Eigen::MatrixXd(P_.topLeftCorner(size_, size_)));
 }
 

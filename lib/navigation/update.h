@@ -89,7 +89,7 @@ void triangulate_columns(Eigen::Ref<Eigen::MatrixXd> A, int pivots);
 /// Collects rows and applies them at once; its memory is taken once.
 class Update {
  public:
-  static constexpr int kMaxRows = 4 * kMaxPoints;
+  static constexpr int kMaxRows = Columns::kMost;  ///< what tracks are compressed to
 
   Update();
   void begin(const State& state);
