@@ -11,6 +11,7 @@
 #include "navigation/aiding/heading_rows.h"
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
 #include "navigation/motion/road_level.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
@@ -176,7 +177,7 @@ double HeadingHypotheses::log_posterior(size_t i) const {
   const Mean& x = filters_[i].state().x;
   const Eigen::Vector3d forward = vehicle::R_imu_vehicle(x.mounting) * Eigen::Vector3d::UnitX();
   const double speed = (x.nav.q_level_imu * forward).dot(x.nav.velocity);
-  return log_weights_[i] + (speed < -kReverseSpeed ? kReverseLogProbability : 0.0);
+  return log_weights_[i] + (speed < -vehicle::kReverseSpeed ? kReverseLogProbability : 0.0);
 }
 
 void HeadingHypotheses::normalise() {

@@ -12,8 +12,6 @@ namespace roadfix::navigation {
 
 class HeadingHypotheses {
  public:
-  static constexpr double kReverseSpeed = 4.0;  ///< m/s, above which hardly a car is in reverse
-
   explicit HeadingHypotheses(const NavigationConfig& config) : config_(config) {}
 
   void start(const inertial::Earth& earth, const StartState& start);

@@ -2,25 +2,20 @@
 
 #include <cmath>
 
+#include "geodesy/gravity.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_control.h"
 #include "vehicle/axle_velocity.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
 constexpr double kEvery = 0.1;            // s between two attempts
-constexpr double kForward = 4.0;          // m/s: faster, hardly a car is in reverse
 constexpr double kRestSpeed = 0.02;       // m/s, of wheels that stand
 constexpr double kRestVelocity = 0.02;    // m/s, sigma of a start where wheels say that it stands
 constexpr double kUnseenVelocity = 0.05;  // m/s, where a still picture alone does
-constexpr double kEarthRate = 7.3e-5;     // rad/s: looks like bias
 constexpr int kCalmBlocks = 4;            // in a row, where neither says anything
-constexpr double kStandingAccel = 0.03;   // m/s2, by which the mean specific force may miss gravity while standing
-constexpr double kMovingAccel = 1.5;      // m/s2, along the way, likewise in motion: everyday driving
-constexpr double kLeastSpeed = 1.0;       // m/s: slower, a start waits for rest
-constexpr double kAside = 0.1;            // m/s, sigma of the velocity across the vehicle,
-constexpr double kAsideShare = 0.05;      // and what sideslip adds, as a share of the speed
 constexpr double kLocalYaw = 1e-4;        // rad: the heading at the start is a convention
 
 StartState local_start(const LocalContext& c) {
@@ -50,24 +45,25 @@ std::optional<StartState> start_at_rest(const LocalContext& c) {
   if (block.duration <= 0.0 || !rest) return std::nullopt;
   StartState s = local_start(c);
   s.standing = true;
-  s.accel_std = std::hypot(kStandingAccel, block.accel_spread);
-  // The mean of quarters that differ by so much.
+  s.accel_std = std::hypot(vehicle::kStandingAccel, block.accel_spread);
+  // The mean of quarters that differ by so much; the rate of the Earth looks like a bias.
   s.gyro_std = std::hypot(c.config.facts.imu.gyro / std::sqrt(block.duration), kEarthRate, 0.5 * block.gyro_spread);
   s.velocity_std = c.wheel_speed ? kRestVelocity : kUnseenVelocity;
   return s;
 }
 
 std::optional<StartState> start_with_speed(const LocalContext& c) {
-  if (!c.wheel_speed || std::abs(*c.wheel_speed) < kLeastSpeed) return std::nullopt;
+  if (!c.wheel_speed || std::abs(*c.wheel_speed) < vehicle::kLeastSpeed) return std::nullopt;
   const VehicleFacts& facts = c.config.facts;
   StartState s = local_start(c);
   // The axle moves along the vehicle; the imu besides by the turn about it.
   const Eigen::Vector3d ahead = vehicle::R_imu_vehicle(facts.mounting) * Eigen::Vector3d::UnitX();
   const Eigen::Vector3d v_imu = *c.wheel_speed * ahead - s.mean_gyro.cross(facts.p_imu_axle);
   s.mean_accel -= s.mean_gyro.cross(v_imu);
-  s.accel_std = kMovingAccel;
+  s.accel_std = vehicle::kEverydayAccel;
   s.velocity = level_attitude(s.mean_accel, 0.0) * v_imu;
-  s.velocity_std = kAside + (kAsideShare + facts.mounting_std.tail<2>().maxCoeff()) * std::abs(*c.wheel_speed);
+  s.velocity_std =
+      vehicle::kAside + (vehicle::kAsideShare + facts.mounting_std.tail<2>().maxCoeff()) * std::abs(*c.wheel_speed);
   return s;
 }
 
@@ -91,7 +87,7 @@ std::optional<StartState> LocalStart::attempt(const NavigationConfig& config, in
   }
   const bool heard = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < WheelSpeedControl::kSilent;
   const double speed = std::abs(speed_);
-  if (heard && (has_sign_ || speed < kRestSpeed || speed > kForward)) context.wheel_speed = speed_;
+  if (heard && (has_sign_ || speed < kRestSpeed || speed > vehicle::kReverseSpeed)) context.wheel_speed = speed_;
   if (const auto rest = start_at_rest(context)) return rest;
   return fresh ? start_with_speed(context) : std::nullopt;
 }

@@ -5,6 +5,7 @@
 #include "navigation/aiding/nonholonomic/nonholonomic_control.h"
 #include "navigation/initialisation/heading_hypotheses.h"
 #include "vehicle/axle_velocity.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
@@ -16,11 +17,8 @@ constexpr double kEvery = 1.0;     // s between two attempts
 constexpr double kLevel = 0.5;     // s from the beginning, whose mean specific force is taken for gravity
 // m/s along the vehicle: a guess that is too low approaches the truth from below, one too high overshoots beyond zero.
 constexpr double kGuess = 6.0, kGuessStd = 15.0;
-constexpr double kAside = 0.1, kAsideShare = 0.05;    // m/s and of the speed: across the vehicle
 constexpr double kMountingKnown = 0.5;                // rad; known worse, nobody knows which way is ahead
-constexpr double kStartAccel = 1.5;                   // m/s2 of everyday driving, which levelling takes for a slope
 constexpr double kLeastTilt = 0.1;                    // rad, of a road and a lean
-constexpr double kLeastSpeed = 1.0;                   // m/s, at the beginning
 constexpr double kKnownShare = 0.1, kKnownStd = 1.0;  // of the speed; m/s: of the speed at the end, at most
 constexpr double kHopeless = 0.5;                     // likewise: nothing has told it
 constexpr double kSettled = 0.3;  // of their standard deviations, by which the last pass may have moved speed and tilt
@@ -91,7 +89,7 @@ MovingStart::Started MovingStart::go_through(const NavigationConfig& config, con
   start.local = true;
   BaseVector sigmas = start_sigmas(config, start, 1e-4);
   sigmas.segment<2>(kAtt).setConstant(
-      std::hypot(kLeastTilt, kStartAccel / inertial::Earth().gravity(known.nav.position).norm()));
+      std::hypot(kLeastTilt, vehicle::kEverydayAccel / inertial::Earth().gravity(known.nav.position).norm()));
   Filter blind(config, inertial::Earth(), false);
   blind.initialise(course, sigmas);
   Started run{Filter(config, inertial::Earth(), true), camera};
@@ -101,7 +99,8 @@ MovingStart::Started MovingStart::go_through(const NavigationConfig& config, con
   // The velocity is known in vehicle axes, whatever the attitude is: nu = R du, free of phi.
   Eigen::Vector3d spread = Eigen::Vector3d::Constant(kGuessStd);
   const double mounting_std = config.facts.mounting_std.tail<2>().maxCoeff();
-  if (mounting_std < kMountingKnown) spread.tail<2>().setConstant(kAside + (kAsideShare + mounting_std) * kGuessStd);
+  if (mounting_std < kMountingKnown)
+    spread.tail<2>().setConstant(vehicle::kAside + (vehicle::kAsideShare + mounting_std) * kGuessStd);
   const Eigen::Matrix3d R = q.toRotationMatrix() * vehicle::R_imu_vehicle(config.facts.mounting);
   const Eigen::Matrix3d cov = R * spread.cwiseAbs2().asDiagonal() * R.transpose();
   state.P().block<3, 3>(kVel, kVel) = 0.5 * (cov + cov.transpose());
@@ -164,7 +163,7 @@ std::optional<MovingStart::Started> MovingStart::attempt(const NavigationConfig&
     const double tilt_std = std::sqrt(run.filter.state().P().diagonal().segment<2>(kAtt).maxCoeff());
     const double ahead =
         prior.velocity.norm() > 0.0 ? at.velocity.dot(prior.velocity.normalized()) : at.velocity.norm();
-    if (!(ahead > kLeastSpeed)) return std::nullopt;
+    if (!(ahead > vehicle::kLeastSpeed)) return std::nullopt;
     if (pass > kSurePass && end.std > kHopeless * end.value) return std::nullopt;
     if (pass >= kSurePass && std::abs(ahead - before) < kSettled * end.std && tilted < kSettled * tilt_std) {
       const bool known = end.std < std::min(kKnownStd, kKnownShare * end.value);

@@ -6,6 +6,7 @@
 #include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
@@ -14,13 +15,10 @@ namespace {
 constexpr double kFixMaxAge = 2.5;      // s, of a fix to start from
 constexpr double kFixMaxSpacing = 6.0;  // s, between two fixes that give a velocity
 constexpr double kFixMinSpacing = 0.5;  // s
-constexpr double kStandingSpeed = 0.3;  // m/s
 constexpr double kParkedSlack = 3.0;    // m, by which fixes may miss the place beyond their sigma (another bay is 2.5)
 constexpr double kParkedPlace = 0.5;    // m, by which a parked car may have been rolled
 constexpr double kParkedTilt = 0.02;    // rad; more, and it stands elsewhere
 constexpr double kCarAcceleration = 2.0;    // m/s2, by which a mean velocity may differ from the present one
-constexpr double kStandingAccel = 0.03;     // m/s2, by which the mean specific force may miss gravity while standing
-constexpr double kMovingAccel = 1.5;        // m/s2, likewise in motion
 constexpr double kStandingVelocity = 0.05;  // m/s
 constexpr double kStandingForce = 0.1;      // m/s2, of the mean specific force against gravity, besides biases
 
@@ -60,7 +58,7 @@ StartState standing_start(const StartContext& c) {
   s.standing = true;
   s.mean_gyro = b.gyro;
   s.mean_accel = c.config.facts.has_imu ? b.accel : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-  s.accel_std = kStandingAccel;
+  s.accel_std = vehicle::kStandingAccel;
   s.velocity_std = kStandingVelocity;
   s.memory = c.memory;
   return s;
@@ -83,10 +81,10 @@ std::optional<StartState> StartWithFixes::attempt(const StartContext& c) const {
   const VehicleFacts& facts = c.config.facts;
   const double g = normal_gravity_enu(*c.enu, Eigen::Vector3d::Zero()).norm();
   StartState s = standing_start(c);
-  s.standing = c.standstill.calm() && v->value.norm() < kStandingSpeed &&
+  s.standing = c.standstill.calm() && v->value.norm() < vehicle::kStandingSpeed &&
                std::abs(s.mean_accel.norm() - g) < kStandingForce + 4.0 * facts.accel_bias_std;
   if (!s.standing) {
-    s.accel_std = kMovingAccel;
+    s.accel_std = vehicle::kEverydayAccel;
     s.velocity = v->value;
     // A velocity between fixes is that of their middle, half their spacing and the fix's age ago.
     const double since =

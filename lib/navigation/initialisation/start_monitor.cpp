@@ -2,6 +2,7 @@
 
 #include "navigation/initialisation/heading_hypotheses.h"
 #include "vehicle/axle_velocity.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
@@ -24,7 +25,7 @@ void StartMonitor::see_fix(const Mean& x, bool displaced) {
 
 bool StartMonitor::heads_backwards(const Mean& x, bool excused) {
   const Eigen::Vector3d forward = x.nav.q_level_imu * (vehicle::R_imu_vehicle(x.mounting) * Eigen::Vector3d::UnitX());
-  if (excused || forward.dot(x.nav.velocity) > -HeadingHypotheses::kReverseSpeed) backwards_since_us_ = x.t_us;
+  if (excused || forward.dot(x.nav.velocity) > -vehicle::kReverseSpeed) backwards_since_us_ = x.t_us;
   return seconds_between(backwards_since_us_, x.t_us) > kReverseTime;
 }
 

@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "navigation/aiding/zero_motion/zero_motion_model.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kStandingSpeed = 0.3;   // m/s
 constexpr double kStandingRate = 4e-3;   // rad/s
 constexpr int kCalmBlocks = 6;           // in a row; of 5500 blocks of moving cars two at most were
 constexpr double kStillVelocity = 0.05;  // m/s, sigma of a still picture: a pixel at 10 m through 500 px in 0.4 s
@@ -25,7 +25,7 @@ bool ZeroMotionControl::standing(const Filter& filter, const inertial::Standstil
   // A mean of quarters that differ by more than an idling engine makes them is known by as much less.
   const double rate = kStandingRate + (standstill.calm() ? 0.0 : 0.5 * standstill.block().gyro_spread);
   if ((standstill.block().gyro - x.gyro_bias).norm() > rate) return false;
-  if (x.nav.velocity.norm() < kStandingSpeed) return true;
+  if (x.nav.velocity.norm() < vehicle::kStandingSpeed) return true;
   // A velocity that is hardly known carries little information; calm for long carries much.
   if (standstill.calm_blocks() < kCalmBlocks) return false;
   const Measurement<3> zero = zero_velocity(filter.state(), 1e-3);
