@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "features/corners.h"
-#include "features/median.h"
 #include "features/saved_features.h"
+#include "statistics/upper_median.h"
 
 namespace roadfix {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "features/median.h"
 #include "samples/samples.h"
 #include "slam/two_view.h"
+#include "statistics/upper_median.h"
 
 namespace roadfix {
 namespace {

@@ -4,8 +4,8 @@
 #include <numeric>
 #include <utility>
 
-#include "features/median.h"
 #include "slam/track_shifts.h"
+#include "statistics/upper_median.h"
 
 namespace roadfix {
 namespace {

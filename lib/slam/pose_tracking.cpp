@@ -5,13 +5,13 @@
 #include <cmath>
 #include <utility>
 
-#include "features/median.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"
 #include "slam/bearing_only_pose.h"
 #include "slam/pose_covariance.h"
 #include "slam/track_shifts.h"
 #include "slam/triangulation.h"
+#include "statistics/upper_median.h"
 
 namespace roadfix {
 namespace {

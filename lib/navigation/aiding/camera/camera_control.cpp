@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "geometry/so3.h"
+#include "navigation/aiding/camera/common_tracks.h"
+#include "statistics/upper_median.h"
 
 namespace roadfix::navigation {
 
@@ -17,7 +19,6 @@ constexpr double kLongestStep = 0.2;  // s, at most, that one picture counts for
 
 // s, between the two pictures of a flow, at least and where there are enough, and of the newer one.
 constexpr double kLeastFlowSpan = 0.25, kFlowSpan = 0.45, kFlowAge = 0.3;
-constexpr size_t kFlowTracks = 10;       // common, at least
 constexpr double kStillMotion_px = 1.0;  // that a standing car's camera may make: an idling engine
 constexpr double kRayleighMedian = 1.177, kRayleighMedianStd = 0.849;  // of unit sigma; the second over sqrt(n)
 
@@ -117,19 +118,14 @@ std::optional<CameraControl::Flow> CameraControl::flow(int64_t t_us, const Mean&
   if (same_picture(before->picture, now->picture)) return std::nullopt;
   std::vector<double> moved;
   double variance = 0.0;
-  auto old = before->picture.tracks.begin();
-  for (const TrackSighting& s : now->picture.tracks) {
-    while (old != before->picture.tracks.end() && old->track < s.track) ++old;
-    if (old == before->picture.tracks.end() || old->track != s.track) continue;
-    moved.push_back((s.left - old->left).norm());
+  for_each_common(before->picture.tracks, now->picture.tracks, [&](const TrackSighting& then, const TrackSighting& s) {
+    moved.push_back((s.left - then.left).norm());
     variance += 2.0 * s.sigma_px * s.sigma_px + pictures * s.walk_px * s.walk_px;
-  }
-  if (moved.size() < kFlowTracks) return std::nullopt;
+  });
+  if (moved.size() < kEnoughCommon) return std::nullopt;
   const auto count = static_cast<double>(moved.size());
-  const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);
-  std::nth_element(moved.begin(), middle, moved.end());
   const double noise = std::sqrt(variance / count) * (kRayleighMedian + 3.0 * kRayleighMedianStd / std::sqrt(count));
-  return Flow{*middle, std::hypot(kStillMotion_px, noise)};
+  return Flow{upper_median(std::move(moved)), std::hypot(kStillMotion_px, noise)};
 }
 
 /// (N.6.21): a picture without parallax tells nothing new, and the window keeps its baseline.

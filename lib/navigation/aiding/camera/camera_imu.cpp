@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/so3.h"
+#include "navigation/aiding/camera/common_tracks.h"
 
 namespace roadfix::navigation {
 
@@ -27,12 +28,9 @@ struct Match {
 
 std::vector<Match> matches_of(const SeenPicture& before, const SeenPicture& now) {
   std::vector<Match> out;
-  auto old = before.points.begin();
-  for (const SeenPoint& p : now.points) {
-    while (old != before.points.end() && old->track < p.track) ++old;
-    if (old != before.points.end() && old->track == p.track)
-      out.push_back({old->left.z.homogeneous(), p.left.z.homogeneous(), p.left.px});
-  }
+  for_each_common(before.points, now.points, [&](const SeenPoint& then, const SeenPoint& p) {
+    out.push_back({then.left.z.homogeneous(), p.left.z.homogeneous(), p.left.px});
+  });
   return out;
 }
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "navigation/aiding/camera/common_tracks.h"
+
 namespace roadfix::navigation {
 
 namespace {
@@ -9,7 +11,6 @@ namespace {
 // Noise moves a place by a tenth of a pixel: of ten tracks, that nine stay within a hundredth comes once in 1e9 pictures.
 constexpr double kSame_px = 0.01;
 constexpr double kSameShare = 0.9;
-constexpr size_t kEnough = 10;
 
 std::optional<EyePoint> eye_point(const Camera& lens, const Eigen::Vector2d& pixel) {
   const auto z = lens.unproject(pixel);
@@ -40,14 +41,11 @@ SeenPicture seen_picture(const TrackPicture& picture, const Camera& left, const 
 
 bool same_picture(const TrackPicture& before, const TrackPicture& now) {
   size_t common = 0, same = 0;
-  auto old = before.tracks.begin();
-  for (const TrackSighting& s : now.tracks) {
-    while (old != before.tracks.end() && old->track < s.track) ++old;
-    if (old == before.tracks.end() || old->track != s.track) continue;
+  for_each_common(before.tracks, now.tracks, [&](const TrackSighting& then, const TrackSighting& s) {
     ++common;
-    same += (s.left - old->left).norm() < kSame_px ? 1 : 0;
-  }
-  return common >= kEnough && static_cast<double>(same) > kSameShare * static_cast<double>(common);
+    same += (s.left - then.left).norm() < kSame_px ? 1 : 0;
+  });
+  return common >= kEnoughCommon && static_cast<double>(same) > kSameShare * static_cast<double>(common);
 }
 
 }  // namespace roadfix::navigation

@@ -41,7 +41,7 @@ void serialise_picture(Archive& a, TrackPicture& picture) {
 template <class Archive>
 void TrackStore::serialise(Archive& a) {
   serialise_list(a, tracks_, static_cast<int64_t>(kMostTracks), [&](Track& t) {
-    a(t.id, t.alive, t.walk_px2, t.count);
+    a(t.track, t.alive, t.walk_px2, t.count);
     if (t.count < 0 || t.count > kMaxViews) throw std::runtime_error("state: impossible number of sightings");
     for (int i = 0; i < t.count; ++i) {
       Sighting& s = t.seen[static_cast<size_t>(i)];

@@ -36,7 +36,7 @@ struct Sighting {
 
 /// A track's sightings that have not been used yet, oldest first.
 struct Track {
-  int64_t id = 0;
+  int64_t track = 0;
   bool alive = true;      ///< seen in the newest picture
   double walk_px2 = 0.0;  ///< since the newest sighting
   int count = 0;
@@ -74,7 +74,7 @@ class TrackStore {
   void serialise(Archive& a);
 
  private:
-  std::vector<Track> tracks_;  ///< ascending id
+  std::vector<Track> tracks_;  ///< ascending track
 };
 
 }  // namespace roadfix::navigation

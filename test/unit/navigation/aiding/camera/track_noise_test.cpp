@@ -186,5 +186,5 @@ TEST_CASE("a track's walk goes on through pictures without a pose and through po
   CHECK(store.tracks()[0].seen[1].walk_px2 == Approx(1.0));
   store.drop_ended();
   REQUIRE(store.tracks().size() == 2);
-  CHECK(store.tracks()[1].id == 5);
+  CHECK(store.tracks()[1].track == 5);
 }

@@ -1,4 +1,4 @@
-/// Of what tracks were off by.
+/// A median that is one of the values, without interpolation.
 #pragma once
 
 #include <algorithm>
