@@ -57,11 +57,18 @@ Eigen::Vector2d off_way(const Filter& filter, const Queued& fix) {
   return (m.residual + s.x.gnss_bias + s.x.gnss_return).head<2>();
 }
 
-/// The receiver may be off by this much more (m, level axes).
-void widen_bias(Filter& filter, const Eigen::Vector3d& off) {
-  BaseVector wider = BaseVector::Zero();
-  wider.segment<3>(kGnssBias) = off;
-  filter.widen(wider);
+/// The receiver may be off by this much more along each level axis (sigma, m).
+void widen_bias(Filter& filter, const Eigen::Vector3d& std) {
+  for (int i = 0; i < 3; ++i) {
+    BaseVector wider = BaseVector::Zero();
+    wider(kGnssBias + i) = std(i);
+    filter.widen(wider);
+  }
+}
+
+/// It is displaced, in a direction that nobody knows: what fixes are off by, `off`, has the filter's own error in it, too.
+void widen_bias_all_round(Filter& filter, const Eigen::Vector3d& off) {
+  widen_bias(filter, Eigen::Vector3d::Constant(off.norm()));
 }
 
 /// What a receiver brought back has faded.
@@ -107,7 +114,7 @@ bool GnssPositionControl::waits(int64_t t_us) const {
 /// What was rejected has moved nothing, and the way is what it was.
 void GnssPositionControl::displace(Filter& filter) {
   set_displaced(filter.state().x.t_us);
-  widen_bias(filter, run_.newest_off());
+  widen_bias_all_round(filter, run_.newest_off());
   filter.watch_for_steps_after(run_.since_us());
 }
 
@@ -349,7 +356,7 @@ AidingRecord GnssPositionControl::decide(Filter& filter, const Queued& fix, cons
   if (filter_is_wrong)
     widen_filter(filter, fix, off);
   else
-    widen_bias(filter, off);
+    widen_bias_all_round(filter, off);
   r = filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, now), Gates::open().nis[3]);
   if (filter_is_wrong) r.status = AidingStatus::kReset;
   return r;
