@@ -154,17 +154,6 @@ void take_known(const std::optional<T>& from, T& to) {
   if (from) to = *from;
 }
 
-/// The same for the IMU's noise, by the names that every estimator's vehicle has for it.
-template <class Vehicle>
-void take_known_noise(const ImuCalibration& imu, Vehicle& to) {
-  take_known(imu.gyro_noise, to.gyro_noise);
-  take_known(imu.accel_noise, to.accel_noise);
-  take_known(imu.gyro_bias_std, to.gyro_bias_std);
-  take_known(imu.accel_bias_std, to.accel_bias_std);
-  take_known(imu.scale_std, to.scale_std);
-  take_known(imu.correlation, to.correlation_s);
-}
-
 class YamlReader;
 class YamlWriter;
 void visit(Calibration& c, YamlReader& v);
