@@ -11,10 +11,9 @@ namespace roadfix {
 namespace {
 
 // Ranges are those of anything that could sit in a road vehicle; they catch a wrong unit or a slipped comma.
-constexpr double kMaxRate = 10000.0;     // Hz
-constexpr double kMaxLength = 50.0;      // m, of a lever arm
-constexpr double kMaxSeconds = 10.0;     // s, of a latency or an offset
-constexpr double kMaxCorrelation = 1e6;  // s
+constexpr double kMaxRate = 10000.0;  // Hz
+constexpr double kMaxLength = 50.0;   // m, of a lever arm
+constexpr double kMaxSeconds = 10.0;  // s, of a latency or an offset
 constexpr double kMaxPixels = 20000.0;
 
 // Standard deviations of a place seen from the IMU: about as far as it may be, and what a tape measure leaves.
@@ -32,7 +31,8 @@ void visit(ImuCalibration& c, Visitor& v) {
   v.optional_number("gyro_bias_std_radps", c.gyro_bias_std, 0.0, 10.0);
   v.optional_number("accel_bias_std_mps2", c.accel_bias_std, 0.0, 100.0);
   v.optional_number("scale_std", c.scale_std, 0.0, 1.0);
-  v.optional_number("correlation_s", c.correlation, 1e-3, kMaxCorrelation);
+  v.optional_number("correlation_s", c.correlation, 1e-3, kLongestCorrelation_s);
+  v.optional_number("accel_correlation_s", c.accel_correlation, 1e-3, kLongestCorrelation_s);
   v.optional_number("time_offset_std_s", c.time_offset_std, 0.0, kMaxSeconds);
 }
 

@@ -22,15 +22,18 @@ enum class CameraModel { kPinhole, kFisheye };
 enum class DistortionModel { kNone, kRadtan, kEquidistant };
 enum class CameraColour { kGray, kBgr };
 
+constexpr double kLongestCorrelation_s = 1e8;  ///< of a bias: constant for every drive
+
 struct ImuCalibration {
-  std::optional<double> rate;             ///< Hz
-  std::optional<double> gyro_noise;       ///< rad/s per sqrt(Hz), white noise density
-  std::optional<double> accel_noise;      ///< m/s2 per sqrt(Hz)
-  std::optional<double> gyro_bias_std;    ///< rad/s
-  std::optional<double> accel_bias_std;   ///< m/s2
-  std::optional<double> scale_std;        ///< relative, gyro and accelerometer
-  std::optional<double> correlation;      ///< s, of biases and scales (first-order Gauss-Markov)
-  std::optional<double> time_offset_std;  ///< s, of its stamps against GNSS time
+  std::optional<double> rate;               ///< Hz
+  std::optional<double> gyro_noise;         ///< rad/s per sqrt(Hz), white noise density
+  std::optional<double> accel_noise;        ///< m/s2 per sqrt(Hz)
+  std::optional<double> gyro_bias_std;      ///< rad/s
+  std::optional<double> accel_bias_std;     ///< m/s2
+  std::optional<double> scale_std;          ///< relative, gyro and accelerometer
+  std::optional<double> correlation;        ///< s, of biases and scales (first-order Gauss-Markov)
+  std::optional<double> accel_correlation;  ///< s, of the accelerometer's biases; absent: the same
+  std::optional<double> time_offset_std;    ///< s, of its stamps against GNSS time
 };
 
 struct GnssCalibration {

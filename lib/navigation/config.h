@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 
 #include "geometry/se3.h"
 #include "inertial/imu_noise.h"
@@ -18,11 +19,12 @@ struct VehicleFacts {
   bool has_receiver = true;  ///< false: a start waits for no fix
   bool has_imu = true;       ///< false: the car's own motion drives the state, see without_imu()
   inertial::ImuNoise imu{1.0e-4, 1.0e-3};
-  double gyro_bias_std = 1.0e-3;  ///< rad/s, at turn-on
-  double accel_bias_std = 0.05;   ///< m/s2, at turn-on
-  double scale_std = 1.0e-3;      ///< of gyro and accelerometer
-  double correlation_s = 3600.0;  ///< of what of biases and scales changes in a run
-  double time_offset_std = 0.0;   ///< s, imu stamp against true time
+  double gyro_bias_std = 1.0e-3;              ///< rad/s, at turn-on
+  double accel_bias_std = 0.05;               ///< m/s2, at turn-on
+  double scale_std = 1.0e-3;                  ///< of gyro and accelerometer
+  double correlation_s = 3600.0;              ///< of what of biases and scales changes in a run
+  std::optional<double> accel_correlation_s;  ///< of the accelerometer's biases, where it is another
+  double time_offset_std = 0.0;               ///< s, imu stamp against true time
   double position_latency_std = 0.0, velocity_latency_std = 0.0, wheel_latency_std = 0.0;  ///< s
   double wheel_scale_std = 0.01;
   vehicle::WheelFacts wheels;

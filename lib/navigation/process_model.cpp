@@ -31,9 +31,9 @@ ProcessModel::Diagonal ProcessModel::over(double T, const State& state, bool anc
   const VehicleFacts& v = facts_;
   const ProcessNoise& p = process_;
   // (N.2.4): the in-run part of biases and scales walks; what is beyond it is constant since turn-on.
-  const double walk = 2.0 * T / v.correlation_s;
+  const double walk = 2.0 * T / v.correlation_s, accel_walk = 2.0 * T / v.accel_correlation_s.value_or(v.correlation_s);
   d.noise.segment<3>(kGyroBias) = walk * square(std::min(v.gyro_bias_std, p.gyro_drift_max)) * v.measured_rates();
-  d.noise.segment<3>(kAccelBias).setConstant(walk * square(std::min(v.accel_bias_std, p.accel_drift_max)));
+  d.noise.segment<3>(kAccelBias).setConstant(accel_walk * square(std::min(v.accel_bias_std, p.accel_drift_max)));
   d.noise.segment<6>(kGyroScale).setConstant(walk * square(v.scale_std));
   if (!anchored && v.has_imu) {  // (N.2.10): where nobody knows the Earth's rate, biases hold it
     const double turned = 2.0 * T / kHeadingTime, coriolis = 2.0 * kEarthRate * state.x.nav.velocity.norm();

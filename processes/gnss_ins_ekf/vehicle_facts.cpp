@@ -59,6 +59,7 @@ navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
     take_known(imu->accel_bias_std, v.accel_bias_std);
     take_known(imu->scale_std, v.scale_std);
     take_known(imu->correlation, v.correlation_s);
+    v.accel_correlation_s = imu->accel_correlation;
   }
   if (const auto& gnss = calibration.sensors.gnss) {
     take_known(gnss->position_latency_std, v.position_latency_std);

@@ -177,7 +177,8 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
     take_known(imu->accel_bias_std, s.accel_bias_std);
     take_known(imu->scale_std, s.gyro_scale_std);
     take_walk(imu->gyro_bias_std, imu->correlation, s.gyro_bias_walk);
-    take_walk(imu->accel_bias_std, imu->correlation, s.accel_bias_walk);
+    take_walk(imu->accel_bias_std, imu->accel_correlation ? imu->accel_correlation : imu->correlation,
+              s.accel_bias_walk);
   }
   if (const auto& wheels = calibration.sensors.wheels) {
     take_known(wheels->speed_scale_std, s.wheel_scale_std);

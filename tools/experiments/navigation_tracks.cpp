@@ -40,6 +40,8 @@ navigation::NavigationConfig config_of(const test::TrackDrive& d, const Options&
   v.scale_std = s.imu.gyro_scale_std;
   const double ratio = s.imu.gyro_bias_std_radps / s.imu.gyro_bias_drift_std_radps;
   v.correlation_s = s.imu.bias_correlation_s * (1.0 + ratio * ratio);
+  const double accel_ratio = s.imu.accel_bias_std_mps2 / s.imu.accel_bias_drift_std_mps2;
+  v.accel_correlation_s = s.imu.bias_correlation_s * (1.0 + accel_ratio * accel_ratio);
   v.wheels.speed_noise = s.wheels.speed_noise_mps;
   v.wheel_scale_std = std::hypot(s.wheels.speed_scale_std, s.wheels.wheel_scale_std);
   v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);

@@ -136,10 +136,9 @@ config_t config_message(const SimulatedDrive& drive) {
 /// Correlation time of the one Gauss-Markov process that a calibration knows, standing for a constant bias and one that
 /// wanders: its variance is theirs together, its driving noise, 2 sigma^2 / tau, that of the wandering one.
 double joint_correlation_s(double constant, double wandering, double tau_s) {
-  constexpr double kLongest = 1e6;
-  if (wandering <= 0.0) return constant > 0.0 ? kLongest : tau_s;
+  if (wandering <= 0.0) return constant > 0.0 ? kLongestCorrelation_s : tau_s;
   const double ratio = constant / wandering;
-  return std::min(tau_s * (1.0 + ratio * ratio), kLongest);
+  return std::min(tau_s * (1.0 + ratio * ratio), kLongestCorrelation_s);
 }
 
 /// How far a sensor's stamps get from true time.
@@ -182,8 +181,8 @@ Calibration calibration_of(const SimulatedDrive& drive) {
       std::hypot(imu.gyro_bias_std_radps, imu.gyro_bias_drift_std_radps),
       std::hypot(imu.accel_bias_std_mps2, imu.accel_bias_drift_std_mps2),
       std::max(imu.gyro_scale_std, imu.accel_scale_std),
-      std::min(joint_correlation_s(imu.gyro_bias_std_radps, imu.gyro_bias_drift_std_radps, imu.bias_correlation_s),
-               joint_correlation_s(imu.accel_bias_std_mps2, imu.accel_bias_drift_std_mps2, imu.bias_correlation_s)),
+      joint_correlation_s(imu.gyro_bias_std_radps, imu.gyro_bias_drift_std_radps, imu.bias_correlation_s),
+      joint_correlation_s(imu.accel_bias_std_mps2, imu.accel_bias_drift_std_mps2, imu.bias_correlation_s),
       clock_error_s(imu.link, config.duration_s),
   };
   const GnssConfig& gnss = config.gnss;

@@ -13,7 +13,7 @@ constexpr const char* kFull = R"(
 body_origin: rear_axle
 sensors:
   imu: {rate_hz: 100, gyro_noise_radps_per_rthz: 1.0e-3, accel_noise_mps2_per_rthz: 1.0e-2, gyro_bias_std_radps: 1.0e-2,
-        accel_bias_std_mps2: 0.2, scale_std: 5.0e-3, correlation_s: 600, time_offset_std_s: 0.02}
+        accel_bias_std_mps2: 0.2, scale_std: 5.0e-3, correlation_s: 600, accel_correlation_s: 6.0e+6, time_offset_std_s: 0.02}
   gnss: {rate_hz: 1, lever_arm_body_m: [0.1, -0.2, 1.5], lever_arm_std_m: 0.02, height: msl, position_latency_std_s: 0.7, velocity_latency_std_s: 0.1}
   wheels: {rate_hz: 10, speed_scale_std: 0.01, speed_noise_mps: 0.03, latency_std_s: 0.02, track_width_m: 1.6, lever_arm_body_m: [-0.7, 0.1, -0.3], lever_arm_std_m: 0.1}
   mag: {declination_deg: 3.5, hard_iron_ut: [1, 2, 3], soft_iron: [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]}
@@ -38,6 +38,7 @@ TEST_CASE("a full calibration is read and written without loss") {
   const Calibration c = parse_calibration(kFull, "calibration.yaml");
   CHECK(c.body_origin == BodyOrigin::kRearAxle);
   CHECK(c.sensors.imu->correlation == 600.0);
+  CHECK(c.sensors.imu->accel_correlation == 6e6);
   CHECK(c.sensors.gnss->height == HeightKind::kMeanSeaLevel);
   CHECK(c.sensors.gnss->lever_arm->y() == -0.2);
   CHECK(c.sensors.gnss->lever_arm_std == 0.02);

@@ -1,9 +1,10 @@
-// What a calibration says, or does not say, of how old GNSS values are at their stamps.
+// What a calibration says, or does not say, of how old GNSS values are at their stamps, and of how biases walk.
 #include <catch2/catch.hpp>
 #include <cstdio>
 
 #include "gnss_ins_ekf/messages.h"
 #include "gnss_ins_ekf/vehicle_facts.h"
+#include "navigation/process_model.h"
 #include "unit/navigation/filter_run.h"
 
 using namespace roadfix;
@@ -115,4 +116,26 @@ TEST_CASE("INS_STATUS tells how old wheel speeds are, and how far the IMU's cloc
   CHECK(std::abs(told.imu_time_offset_s + 0.03) < 3.0 * told.imu_time_offset_std_s);
   CHECK(std::abs(told.imu_time_offset_s) > 3.0 * told.imu_time_offset_std_s);  // teeth: nought would not do
   CHECK(told.wheel_scale_steps == 0);
+}
+
+TEST_CASE("the accelerometer's biases walk by their own correlation time, and by the gyro's where it is not told") {
+  Calibration c;
+  ImuCalibration& imu = c.sensors.imu.emplace();
+  imu.gyro_bias_std = 1e-3;
+  imu.accel_bias_std = 0.03;
+  imu.correlation = 600.0;
+  constexpr double kStep = 0.05;  // s
+  const auto walk = [&](int at) {
+    navigation::NavigationConfig config;
+    const navigation::VehicleFacts said = vehicle_facts(c);
+    config.facts.gyro_bias_std = said.gyro_bias_std;
+    config.facts.accel_bias_std = said.accel_bias_std;
+    config.facts.correlation_s = said.correlation_s;
+    config.facts.accel_correlation_s = said.accel_correlation_s;
+    return navigation::ProcessModel(config).over(kStep, navigation::State(false), true).noise(at);
+  };
+  CHECK(walk(navigation::kAccelBias) == Approx(2.0 * kStep * 0.03 * 0.03 / 600.0));
+  imu.accel_correlation = 6e6;
+  CHECK(walk(navigation::kAccelBias) == Approx(2.0 * kStep * 0.03 * 0.03 / 6e6));
+  CHECK(walk(navigation::kGyroBias) == Approx(2.0 * kStep * 1e-3 * 1e-3 / 600.0));
 }

@@ -131,6 +131,11 @@ TEST_CASE("calibration values reach the odometry, missing ones keep the default"
   const WheelSensors s = wheel_sensors(c);
   CHECK(s.gyro_noise == 7e-4);
   CHECK(s.gyro_bias_walk == Approx(1e-4));
+  c.sensors.imu->accel_bias_std = 1e-2;
+  CHECK(wheel_sensors(c).accel_bias_walk == Approx(1e-3));
+  c.sensors.imu->accel_correlation = 20'000.0;
+  CHECK(wheel_sensors(c).accel_bias_walk == Approx(1e-4));
+  CHECK(wheel_sensors(c).gyro_bias_walk == Approx(1e-4));
   CHECK(s.accel_noise == WheelSensors{}.accel_noise);
   CHECK(*s.track_width == 1.55);
 }
