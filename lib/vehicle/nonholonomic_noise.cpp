@@ -25,7 +25,7 @@ void LearntVariance::learn(double square, double noise, double scale, double ind
   value_ = std::max(value_ + counts / count_ * ((square - noise) / scale - value_), least_);
 }
 
-double LearntVariance::upper(double confidence) const { return value_ * (1.0 + confidence * std::sqrt(2.0 / count_)); }
+double LearntVariance::expected() const { return value_ * (1.0 + 2.0 / count_); }
 
 NonholonomicNoise::NonholonomicNoise(const NonholonomicConfig& config, Axis axis)
     : config_(config),
@@ -38,7 +38,7 @@ double NonholonomicNoise::correlation() const { return std::clamp(product_ - per
 double NonholonomicNoise::sigma(double acceleration) const {
   const double inflation = (1.0 + correlation()) / (1.0 - correlation());
   const double square = acceleration * acceleration;
-  const double variance = straight_.upper(config_.confidence) + square * slope_.upper(config_.confidence);
+  const double variance = straight_.expected() + square * slope_.expected();
   return std::clamp(std::sqrt(inflation * variance), config_.min_std, config_.max_std);
 }
 

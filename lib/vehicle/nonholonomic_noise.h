@@ -13,7 +13,6 @@ struct NonholonomicConfig {
   double lateral_prior = 0.2;   ///< residuals that the start counts for: cars differ most there
   double vertical_prior = 4.0;  ///< likewise
   double memory = 400.0;        ///< residuals
-  double confidence = 3.0;      ///< standard deviations of the learnt variance that are added to it
   double min_std = 0.001;       ///< m/s, the least that is used
   double max_std = 0.5;         ///< m/s
 };
@@ -26,7 +25,6 @@ void visit(NonholonomicConfig& c, Visitor& v) {
   v.number("lateral_prior", c.lateral_prior, 0.01, 1e6);
   v.number("vertical_prior", c.vertical_prior, 0.01, 1e6);
   v.number("memory", c.memory, 1.0, 1e6);
-  v.number("confidence", c.confidence, 0.0, 100.0);
   v.number("min_std_mps", c.min_std, 1e-4, 10.0);
   v.number("max_std_mps", c.max_std, 1e-3, 10.0);
 }
@@ -48,8 +46,8 @@ class LearntVariance {
   /// `square` has the mean value() * scale + noise; `independent`: its share that is not correlated with the last.
   void learn(double square, double noise, double scale, double independent, double memory);
   [[nodiscard]] double value() const { return value_; }
-  /// With `confidence` of its own standard deviations on top.
-  [[nodiscard]] double upper(double confidence) const;
+  /// Mean of what the variance may be: more than value() where few squares tell of it.
+  [[nodiscard]] double expected() const;
 
   template <class Archive>
   void serialise(Archive& a) {

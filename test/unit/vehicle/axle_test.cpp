@@ -59,18 +59,24 @@ TEST_CASE("speeds that are no car's are refused") {
   CHECK(axle_speed(w, {}).has_value());
 }
 
-TEST_CASE("the constraint's noise is found among the filter's own errors") {
+TEST_CASE("the constraint's noise is found among the filter's own errors, neither too small nor with a margin") {
   for (const double truth : {0.01, 0.05}) {
-    std::mt19937 rng(1);
-    std::normal_distribution<double> n;
-    NonholonomicNoise noise(NonholonomicConfig(), NonholonomicNoise::Axis::kLateral);
-    for (int i = 0; i < 2000; ++i) {
-      const double explained = 0.02 * 0.02;
-      const double r = truth * n(rng) + 0.02 * n(rng);
-      noise.learn({r, explained, noise.sigma(0.0) * noise.sigma(0.0), true}, 0.0);
+    constexpr int kSeeds = 50;
+    double mean = 0.0;  // of the variance that is used, over the true one
+    for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
+      std::mt19937 rng(seed);
+      std::normal_distribution<double> n;
+      NonholonomicNoise noise(NonholonomicConfig(), NonholonomicNoise::Axis::kLateral);
+      for (int i = 0; i < 2000; ++i) {
+        const double explained = 0.02 * 0.02;
+        const double r = truth * n(rng) + 0.02 * n(rng);
+        noise.learn({r, explained, noise.sigma(0.0) * noise.sigma(0.0), true}, 0.0);
+      }
+      mean += noise.sigma(0.0) * noise.sigma(0.0) / (truth * truth) / kSeeds;
     }
-    CHECK(noise.sigma(0.0) > truth);
-    CHECK(noise.sigma(0.0) < 1.8 * truth);
+    CAPTURE(truth);
+    CHECK(mean > 0.9);
+    CHECK(mean < (truth < 0.02 ? 1.8 : 1.2));  // what the filter's errors hide leaves a correlation, which only widens
   }
 }
 
