@@ -88,7 +88,7 @@ std::optional<StartState> LocalStart::attempt(const NavigationConfig& config, in
   const bool heard = wheels_at_us_ != 0 && std::abs(seconds_between(wheels_at_us_, t_us)) < WheelSpeedControl::kSilent;
   const double speed = std::abs(speed_);
   if (heard && (has_sign_ || speed < kRestSpeed || speed > vehicle::kReverseSpeed)) context.wheel_speed = speed_;
-  if (const auto rest = start_at_rest(context)) return rest;
+  if (auto rest = start_at_rest(context)) return rest;
   return fresh ? start_with_speed(context) : std::nullopt;
 }
 
