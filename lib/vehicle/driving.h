@@ -3,13 +3,12 @@
 
 namespace roadfix::vehicle {
 
-inline constexpr double kReverseSpeed = 4.0;   ///< m/s, above which hardly a car is in reverse
-inline constexpr double kStandingSpeed = 0.3;  ///< m/s, below which a car that shows no motion stands
-inline constexpr double kStandingAccel =
-    0.03;  ///< m/s2, by which the mean specific force of a car at rest may miss gravity
-inline constexpr double kEverydayAccel = 1.5;  ///< m/s2, likewise of one that drives: what levelling takes for a slope
-inline constexpr double kAside = 0.1;          ///< m/s, sigma of the velocity across the vehicle,
-inline constexpr double kAsideShare = 0.05;    ///< and what sideslip adds, as a share of the speed
-inline constexpr double kLeastSpeed = 1.0;     ///< m/s: slower, its direction does not show
+inline constexpr double kReverseSpeed = 4.0;    ///< m/s, above which hardly a car is in reverse
+inline constexpr double kStandingSpeed = 0.3;   ///< m/s, below which a car that shows no motion stands
+inline constexpr double kStandingAccel = 0.03;  ///< m/s2, by which the mean specific force at rest may miss gravity
+inline constexpr double kEverydayAccel = 1.5;   ///< m/s2, likewise in motion: what levelling takes for a slope
+inline constexpr double kAside = 0.1;           ///< m/s, sigma of the velocity across the vehicle,
+inline constexpr double kAsideShare = 0.05;     ///< and what sideslip adds, as a share of the speed
+inline constexpr double kLeastSpeed = 1.0;      ///< m/s: slower, its direction does not show
 
 }  // namespace roadfix::vehicle

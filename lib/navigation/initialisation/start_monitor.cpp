@@ -1,6 +1,5 @@
 #include "navigation/initialisation/start_monitor.h"
 
-#include "navigation/initialisation/heading_hypotheses.h"
 #include "vehicle/axle_velocity.h"
 #include "vehicle/driving.h"
 

@@ -211,7 +211,7 @@ TEST_CASE("a scenario as it stands is named, another one spelled out so that it 
   CHECK_THAT(named, !Catch::Matchers::Contains("gyro_noise"));
 }
 
-/// Channel, time and bytes of every event, pictures and what the drive's sensors are left out.
+/// Channel, time and bytes of every event, without the pictures and CONFIG_DRIVE.
 std::vector<std::string> events_of(const std::filesystem::path& path) {
   std::vector<std::string> events;
   LogReader reader(path);
