@@ -158,14 +158,28 @@ SE3 CameraMounting::T_body_camera() const {
   return {Eigen::Quaterniond(q_wxyz[0], q_wxyz[1], q_wxyz[2], q_wxyz[3]).normalized(), p};
 }
 
-Eigen::Vector3d Calibration::forward_in_body() const {
-  if (!mounting || !mounting->angles_deg) return Eigen::Vector3d::UnitX();
+Eigen::Quaterniond Calibration::q_vehicle_body() const {
+  if (!mounting || !mounting->angles_deg) return Eigen::Quaterniond::Identity();
   const Eigen::Vector3d angles = kDegree * *mounting->angles_deg;
-  return quaternion({angles.z(), angles.y(), angles.x()}).conjugate() * Eigen::Vector3d::UnitX();
+  return quaternion({angles.z(), angles.y(), angles.x()});
 }
 
-Eigen::Vector2d Calibration::turn_to_forward() const {
-  return log_q(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), forward_in_body())).tail<2>();
+Calibration Calibration::in_vehicle_axes() const {
+  Calibration c = *this;
+  if (!mounting || !mounting->angles_deg) return c;
+  const Eigen::Quaterniond turn = q_vehicle_body();
+  c.mounting->angles_deg.reset();
+  if (c.sensors.gnss && c.sensors.gnss->lever_arm) c.sensors.gnss->lever_arm = turn * *c.sensors.gnss->lever_arm;
+  if (c.sensors.wheels && c.sensors.wheels->lever_arm)
+    c.sensors.wheels->lever_arm = turn * *c.sensors.wheels->lever_arm;
+  for (std::optional<CameraCalibration>* camera : {&c.sensors.camera_left, &c.sensors.camera_right}) {
+    if (!*camera || !(*camera)->mounting) continue;
+    CameraMounting& m = *(*camera)->mounting;
+    const Eigen::Quaterniond q = turn * m.T_body_camera().q;
+    m.p = turn * m.p;
+    m.q_wxyz << q.w(), q.x(), q.y(), q.z();
+  }
+  return c;
 }
 
 PlaceOnVehicle Calibration::rear_axle() const {

@@ -1,7 +1,8 @@
 /// What is known about one vehicle's sensors: configs/VEHICLE/calibration.yaml, with the keys of a drive folder's
 /// drive.yaml. Everything may be absent, and absent means unknown. A wide sigma says that something is to be estimated.
 ///
-/// body: the IMU's axes as given, x forward, y left, z up up to the mounting angles; origin at the IMU.
+/// body: the IMU's axes as given, the vehicle's (x forward, y left, z up) but for the mounting angles; origin at the IMU.
+/// Poses are of the vehicle's axes.
 #pragma once
 
 #include <Eigen/Dense>
@@ -130,12 +131,12 @@ struct Calibration {
   SensorsCalibration sensors;
   std::optional<MountingCalibration> mounting;
 
-  /// Where the vehicle's x axis points in body axes, as far as that is known.
-  [[nodiscard]] Eigen::Vector3d forward_in_body() const;
+  /// Body's axes in the vehicle's by mounting.angles_deg; none where it is not told.
+  [[nodiscard]] Eigen::Quaterniond q_vehicle_body() const;
 
-  /// The shortest turn from body's x axis there, about body's y and z axes, rad; the roll of the mounting does not
-  /// show.
-  [[nodiscard]] Eigen::Vector2d turn_to_forward() const;
+  /// The same car seen in the vehicle's axes instead of body's, as far as q_vehicle_body() knows them: places and turns of
+  /// antenna, axle and cameras are turned, and angles_deg is gone. Samples of the imu must be turned likewise.
+  [[nodiscard]] Calibration in_vehicle_axes() const;
 
   /// The rear axle's centre: measured where wheels.lever_arm_body_m gives it; zero where the body's origin is the
   /// axle; else unknown.

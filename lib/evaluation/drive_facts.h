@@ -6,8 +6,9 @@
 ///             INVALID; it is drawn all the same.
 ///   reason    kWithheld on a pose that comes from a fix (or has the time of one) which the GNSS channel was not given
 ///             (cut by a window or thinned out); empty otherwise.
-///   q_wxyz    meaningful only where reference.attitude says so (identity otherwise); velocity_mps likewise is in
-///             vehicle axes with attitude and in ENU axes without.
+///   q_wxyz    of the imu's axes as they are mounted, which evaluate turns estimates into; meaningful only where
+///             reference.attitude says so (identity otherwise); velocity_mps likewise is in these axes with attitude and
+///             in ENU axes without.
 /// With reference.of == none and a GNSS channel, import writes the fixes themselves as REFERENCE, of the antenna
 /// (origin ORIGIN_ANTENNA), and sets reference.from_fixes.
 #pragma once

@@ -34,7 +34,7 @@ struct EstimateInput {
   Trajectory trajectory;
   bool local_frame = false;    ///< its own frame: absolute errors mean nothing without an alignment
   bool scale_unknown = false;  ///< lengths up to one factor
-  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< m, vehicle axes: from its point to the reference's
+  Eigen::Vector3d lever_arm = Eigen::Vector3d::Zero();  ///< m, its own axes: from its point to the reference's
   std::vector<double> latencies;                        ///< s, from the time of validity to the time it was logged
   std::vector<ModeSample> modes;                        ///< of the fusion, else empty
   std::vector<ProtectionSample> protection;             ///< bounds published for it, in order of the poses' time

@@ -71,6 +71,19 @@ int64_t default_max_gap_us(const Trajectory& trajectory) {
   return std::max(kSmallestMaxGap_us, 3 * median_interval_us(trajectory));
 }
 
+Odometry in_axes(const Eigen::Quaterniond& turn, const Odometry& pose) {
+  Odometry out = pose;
+  out.T_frame_vehicle.q = pose.T_frame_vehicle.q * turn;
+  out.velocity = turn.conjugate() * pose.velocity;
+  out.angular_rate = turn.conjugate() * pose.angular_rate;
+  const Eigen::Matrix3d back = turn.toRotationMatrix().transpose();
+  Matrix6d J = Matrix6d::Identity();
+  J.bottomRightCorner<3, 3>() = back;
+  out.cov_pose = J * pose.cov_pose * J.transpose();
+  out.cov_velocity = back * pose.cov_velocity * back.transpose();
+  return out;
+}
+
 Odometry at_lever_arm(const Odometry& pose, const Eigen::Vector3d& lever_arm) {
   Odometry out = pose;
   out.T_frame_vehicle.p = pose.T_frame_vehicle * lever_arm;

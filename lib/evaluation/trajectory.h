@@ -27,7 +27,10 @@ int64_t median_interval_us(const Trajectory& trajectory);
 /// The largest gap that interpolation bridges: three median intervals, at least 0.25 s.
 int64_t default_max_gap_us(const Trajectory& trajectory);
 
-/// The same pose of another point of the vehicle: `lever_arm` from the origin, in vehicle axes. Covariance follows.
+/// The same pose of other axes, whose coordinates `turn` takes to the pose's. Covariances follow.
+Odometry in_axes(const Eigen::Quaterniond& turn, const Odometry& pose);
+
+/// The same pose of another point: `lever_arm` from the origin, in the pose's axes. Covariance follows.
 Odometry at_lever_arm(const Odometry& pose, const Eigen::Vector3d& lever_arm);
 
 struct PosePair {

@@ -31,11 +31,14 @@ struct VehicleFacts {
   double magnetic_declination = 0.0;                        ///< rad, east positive
   Eigen::Vector3d hard_iron = Eigen::Vector3d::Zero();      ///< T, subtracted from the field first
   Eigen::Matrix3d soft_iron = Eigen::Matrix3d::Identity();  ///< multiplies what is left
-  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();       ///< rad, pitch and yaw: R_imu_vehicle = Exp(0, p, y)
+  Eigen::Vector2d mounting = Eigen::Vector2d::Zero();       ///< rad, pitch and yaw, prior: R_imu_vehicle = Exp(0, p, y)
   Eigen::Vector3d mounting_std = Eigen::Vector3d::Constant(0.035);  ///< rad, roll, pitch, yaw
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero(), p_imu_antenna_std = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero(), p_imu_axle_std = Eigen::Vector3d::Zero();        ///< m
   std::optional<CameraFacts> camera;
+
+  /// False of a rig that is no part of a car: nobody knows which way is ahead.
+  [[nodiscard]] bool mounting_known() const { return mounting_std.tail<2>().maxCoeff() <= 0.5; }
 
   /// One for each axis whose angular rate is measured.
   [[nodiscard]] Eigen::Vector3d measured_rates() const {

@@ -297,8 +297,10 @@ NavigationOutput Navigation::output() {
     return out;
   }
   predict_output();
-  out.odometry = output_.output();
+  out.imu = output_.output();
+  out.odometry = output_.in_vehicle_axes(out.imu, config_.facts);
   report().judge(out);
+  out.imu.validity = out.odometry.validity;
   return out;
 }
 

@@ -2,8 +2,8 @@
 /// lib/navigation/MODEL.md.
 ///
 /// Frames: level is enu at the first good fix (or at the remembered place), or local where no fix has come: it becomes enu,
-/// with a reset, when fixes tell how it lies in it. imu axes x forward, y left, z up; vehicle
-/// axes differ from the imu's by the mounting angles.
+/// with a reset, when fixes tell how it lies in it. imu axes x forward, y left, z up; vehicle axes differ from the imu's by
+/// the mounting angles, which are estimated. What goes out is of the vehicle's axes, and of the imu's beside it.
 /// Time: inputs come in the order of their stamps as the caller's horizon passes them (advance, add); see() hands in
 /// the newest imu sample ahead of the horizon, and output() is for that one. The state stays behind the horizon by the
 /// longest latency that is possible yet, so that every measurement is used at its own moment.

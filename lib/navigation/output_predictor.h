@@ -29,6 +29,8 @@ class OutputPredictor {
 
   /// For the true time of the newest sample's stamp: level frame to imu; velocity in imu axes, (N.8.1) to (N.8.3).
   [[nodiscard]] Odometry output();
+  /// The same in the vehicle's axes, origin at the imu, (N.8.4) to (N.8.6); `imu`: what output() gave.
+  [[nodiscard]] Odometry in_vehicle_axes(const Odometry& imu, const VehicleFacts& facts) const;
 
   /// `earth`: of the level frame.
   template <class Archive>
@@ -40,10 +42,12 @@ class OutputPredictor {
     if (!begun_) return;
     propagation_.serialise(a);
     x_.serialise(a);
-    a(p_ref_, P_, next_, begun_at_us_, covariance_at_us_, cov_pose_, cov_velocity_);
+    a(p_ref_, P_, next_, begun_at_us_, covariance_at_us_, cov_);
   }
 
  private:
+  static constexpr int kTurn = 3, kSpeed = 6, kAxes = 9, kSize = 11;  ///< of cov_: behind the position
+
   void find_covariance();
 
   Propagation propagation_{inertial::Earth()};
@@ -53,8 +57,8 @@ class OutputPredictor {
   int64_t next_ = 0, begun_at_us_ = 0;
   bool begun_ = false;
   int64_t covariance_at_us_ = 0;
-  Matrix6d cov_pose_ = Matrix6d::Zero();
-  Eigen::Matrix3d cov_velocity_ = Eigen::Matrix3d::Zero();
+  /// Of position, rotation and velocity (imu axes), pitch and yaw of the mounting.
+  Eigen::Matrix<double, kSize, kSize> cov_ = Eigen::Matrix<double, kSize, kSize>::Zero();
 };
 
 }  // namespace roadfix::navigation

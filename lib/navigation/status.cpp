@@ -41,7 +41,7 @@ void StatusReport::judge(NavigationOutput& out) const {
   const double horizontal = std::sqrt(odometry.cov_pose(0, 0) + odometry.cov_pose(1, 1));
   if (!start_.usable()) {
     out.reason = std::string("waits for ") + waits_for();
-  } else if (local && odometry.cov_velocity.diagonal().maxCoeff() > kInvalidVelocity * kInvalidVelocity) {
+  } else if (local && out.imu.cov_velocity.diagonal().maxCoeff() > kInvalidVelocity * kInvalidVelocity) {
     out.reason = "velocity not known well enough";
   } else if (!(horizontal < config_.start.invalid_sigma_m) && !local) {
     out.reason = "position too uncertain";

@@ -18,6 +18,11 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< m/s2, mean specific force, imu axes (standing level: +g on z)
 };
 
+/// The same sample in other axes: `turn` takes coordinates of its own there.
+inline ImuSample in_axes(const Eigen::Quaterniond& turn, const ImuSample& s) {
+  return {s.t_us, turn * s.gyro, turn * s.accel};
+}
+
 enum class FixType { kNone, kSingle, kDifferential, kRtkFloat, kRtkFixed, kDeadReckoning };
 enum class HeightKind { kUnknown, kEllipsoid, kMeanSeaLevel };
 

@@ -30,6 +30,7 @@ class GnssInsStage final : public Stage {
   GnssInsStage(const Calibration& calibration, const GnssInsProcessConfig& config)
       : config_(config),
         calibration_(calibration_text(calibration)),
+        q_vehicle_body_(calibration.q_vehicle_body()),
         pose_slot_(config.publish_period),
         status_slot_(config.status_period) {
     static_cast<navigation::NavigationTuning&>(filter_config_) = config.navigation;
@@ -46,7 +47,7 @@ class GnssInsStage final : public Stage {
                     {"START_GNSS_INS_EKF", "state_t", 0, 0}};
     if (filter_config_.sources.camera && filter_config_.facts.camera)
       spec_.inputs.push_back({"VO_FEATURES", "vo_features2_t", kTracksLateness_us, 0});
-    spec_.state_layout = 34;
+    spec_.state_layout = 35;
     // A car without an IMU is driven by its wheels.
     spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
@@ -57,7 +58,7 @@ class GnssInsStage final : public Stage {
   void apply(const Message& m) override {
     switch (m.input) {
       case kImu:
-        (void)filter_->advance(imu_sample(decode<imu_t>(m.bytes)));
+        (void)filter_->advance(imu(m));
         break;
       case kGnss:
         filter_->add(gnss_fix(decode<gnss_t>(m.bytes)), m.seq);
@@ -78,7 +79,7 @@ class GnssInsStage final : public Stage {
   }
 
   void on_clock(const Message& m) override {
-    if (m.input == kImu) (void)filter_->see(imu_sample(decode<imu_t>(m.bytes)));
+    if (m.input == kImu) (void)filter_->see(imu(m));
     if (m.input == kWheels) (void)filter_->see(wheel_sample(decode<wheels_t>(m.bytes)));
     waits_for_imu_ = m.input != kImu && filter_->has_imu();
   }
@@ -96,7 +97,7 @@ class GnssInsStage final : public Stage {
       outputs.publish(kPose, pose);
     }
     if (status_slot_.due(now_utime)) {
-      ins_status_t status = ins_status(filter_->status(), filter_->filter(), filter_config_.facts);
+      ins_status_t status = ins_status(filter_->status(), filter_->filter(), filter_config_.facts, q_vehicle_body_);
       outputs.publish(kStatus, status);
     }
   }
@@ -136,6 +137,10 @@ class GnssInsStage final : public Stage {
   [[nodiscard]] std::string effective_calibration() const override { return calibration_; }
 
  private:
+  [[nodiscard]] ImuSample imu(const Message& m) const {
+    return in_axes(q_vehicle_body_, imu_sample(decode<imu_t>(m.bytes)));
+  }
+
   /// Where the newest samples were refused (no numbers, beyond any car), the state is of an earlier time: it must not
   /// go out under this stamp as if it were new.
   navigation::NavigationOutput output_of(int64_t now_utime) {
@@ -162,6 +167,7 @@ class GnssInsStage final : public Stage {
 
   GnssInsProcessConfig config_;
   std::string calibration_;
+  Eigen::Quaterniond q_vehicle_body_;  ///< as far as the calibration knows it
   navigation::NavigationConfig filter_config_;
   StageSpec spec_;
   std::optional<navigation::Navigation> filter_;

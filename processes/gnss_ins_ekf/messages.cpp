@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "bus/sample_codec.h"
+#include "geometry/euler.h"
 #include "geometry/frames.h"
+#include "vehicle/axle_velocity.h"
 
 namespace roadfix {
 
@@ -45,19 +47,27 @@ void copy(const Eigen::Vector3d& from, double (&to)[3]) {
 
 double std_of(const Eigen::MatrixXd& P, int i) { return std::sqrt(P(i, i)); }
 
-void fill_estimates(const navigation::Filter& filter, const navigation::VehicleFacts& vehicle, ins_status_t& m) {
+/// Of a vector with covariance P in other axes.
+Eigen::Vector3d axis_sigmas(const Eigen::Matrix3d& turn, const Eigen::Matrix3d& P) {
+  return (turn * P * turn.transpose()).diagonal().cwiseSqrt();
+}
+
+void fill_estimates(const navigation::Filter& filter, const navigation::VehicleFacts& vehicle,
+                    const Eigen::Quaterniond& q_vehicle_body, ins_status_t& m) {
   using namespace navigation;
   const Mean& x = filter.state().x;
   const Eigen::MatrixXd& P = filter.state().P();
-  copy(x.gyro_bias, m.gyro_bias_radps);
-  copy(x.accel_bias, m.accel_bias_mps2);
-  for (int i = 0; i < 3; ++i) {
-    m.gyro_bias_std_radps[i] = std_of(P, kGyroBias + i);
-    m.accel_bias_std_mps2[i] = std_of(P, kAccelBias + i);
-  }
+  // Biases are the imu's, in its own axes.
+  const Eigen::Matrix3d to_body = q_vehicle_body.toRotationMatrix().transpose();
+  copy(to_body * x.gyro_bias, m.gyro_bias_radps);
+  copy(to_body * x.accel_bias, m.accel_bias_mps2);
+  copy(axis_sigmas(to_body, P.block<3, 3>(kGyroBias, kGyroBias)), m.gyro_bias_std_radps);
+  copy(axis_sigmas(to_body, P.block<3, 3>(kAccelBias, kAccelBias)), m.accel_bias_std_mps2);
   m.wheel_scale = 1.0 / (1.0 + x.wheel_scale);
   m.wheel_scale_std = std_of(P, kWheelScale);
-  copy(Eigen::Vector3d(0.0, x.mounting.x(), x.mounting.y()), m.mounting_rad);
+  const YawPitchRoll mounting =
+      yaw_pitch_roll(vehicle::R_imu_vehicle(x.mounting).transpose() * q_vehicle_body.toRotationMatrix());
+  copy(Eigen::Vector3d(mounting.roll, mounting.pitch, mounting.yaw), m.mounting_rad);
   m.mounting_std_rad[0] = vehicle.mounting_std.x();
   m.mounting_std_rad[1] = std_of(P, kMounting);
   m.mounting_std_rad[2] = std_of(P, kMounting + 1);
@@ -143,7 +153,7 @@ void fill_ins_pose(const navigation::NavigationOutput& output, const std::option
 }
 
 ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,
-                        const navigation::VehicleFacts& vehicle) {
+                        const navigation::VehicleFacts& vehicle, const Eigen::Quaterniond& q_vehicle_body) {
   ins_status_t m{};
   m.alignment = static_cast<int8_t>(status.phase);
   m.waits_for = status.waits_for;
@@ -155,7 +165,7 @@ ins_status_t ins_status(const navigation::NavigationStatus& status, const naviga
   m.gnss_reason = status.gnss_reason;
   m.wheel_scale = 1.0;
   m.wheel_scale_steps = status.wheel_scale_steps;
-  if (filter != nullptr) fill_estimates(*filter, vehicle, m);
+  if (filter != nullptr) fill_estimates(*filter, vehicle, q_vehicle_body, m);
   return m;
 }
 

@@ -12,8 +12,9 @@ namespace roadfix {
 
 GnssFix gnss_fix(const gnss_t& message);
 void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose);
+/// q_vehicle_body: by which samples and facts were turned before the filter got them.
 ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,
-                        const navigation::VehicleFacts& vehicle);
+                        const navigation::VehicleFacts& vehicle, const Eigen::Quaterniond& q_vehicle_body);
 aiding_t aiding(const navigation::AidingRecord& record);
 
 }  // namespace roadfix

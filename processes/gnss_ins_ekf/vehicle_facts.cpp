@@ -22,7 +22,8 @@ constexpr double kUnknownCameraOffset = 0.03;
 
 }  // namespace
 
-std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibration) {
+std::optional<navigation::CameraFacts> camera_facts(const Calibration& told) {
+  const Calibration calibration = told.in_vehicle_axes();
   const SensorsCalibration& sensors = calibration.sensors;
   if (!sensors.camera_left || !sensors.camera_left->intrinsics_px || !sensors.camera_left->mounting) return {};
   const CameraCalibration& left = *sensors.camera_left;
@@ -47,7 +48,8 @@ std::optional<navigation::CameraFacts> camera_facts(const Calibration& calibrati
   return c;
 }
 
-navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
+navigation::VehicleFacts vehicle_facts(const Calibration& told) {
+  const Calibration calibration = told.in_vehicle_axes();
   navigation::VehicleFacts v;
   v.camera = camera_facts(calibration);
   v.has_receiver = calibration.sensors.gnss.has_value();
@@ -89,7 +91,6 @@ navigation::VehicleFacts vehicle_facts(const Calibration& calibration) {
     if (mag->hard_iron) v.hard_iron = kMicrotesla * *mag->hard_iron;
     take_known(mag->soft_iron, v.soft_iron);
   }
-  v.mounting = calibration.turn_to_forward();
   if (calibration.mounting && calibration.mounting->std_deg) v.mounting_std = kDegree * *calibration.mounting->std_deg;
   return v;
 }

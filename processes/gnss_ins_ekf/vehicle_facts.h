@@ -1,4 +1,5 @@
 /// What a calibration says about the sensors, as lib/navigation wants to be told; what it leaves open keeps the defaults.
+/// Places and turns are in the vehicle's axes by mounting.angles_deg, Calibration::in_vehicle_axes: samples of the imu must be, too.
 #pragma once
 
 #include <optional>

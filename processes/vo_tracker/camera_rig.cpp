@@ -7,7 +7,7 @@
 namespace roadfix {
 
 CameraRig camera_rig(const Calibration& calibration) {
-  const SensorsCalibration& sensors = calibration.sensors;
+  const SensorsCalibration sensors = calibration.in_vehicle_axes().sensors;
   if (!sensors.camera_left)
     throw std::runtime_error("calibration: sensors.camera_left is missing, vo_tracker needs it");
   CameraRig rig;

@@ -47,7 +47,7 @@ FilterStage::FilterStage(const Calibration& calibration, const VoTrackerConfig& 
   spec_.inputs.push_back({"WHEELS", "wheels_t", kWheelLateness_us, 0});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features2_t"}};
-  spec_.state_layout = 20;
+  spec_.state_layout = 21;
 }
 
 void FilterStage::make_parts() {
@@ -66,7 +66,7 @@ void FilterStage::make_parts() {
 
 void FilterStage::apply(const Message& m) {
   if (m.input == kImu) {
-    (void)filter_->advance(imu_sample(decode<imu_t>(m.bytes)));
+    (void)filter_->advance(in_axes(calibration_.q_vehicle_body(), imu_sample(decode<imu_t>(m.bytes))));
     filter_->clear_records();
   } else if (m.input == kLeft) {
     if (waiting_) track_waiting();
@@ -104,11 +104,11 @@ std::optional<CameraMotion> FilterStage::motion_until(int64_t t_us) const {
 }
 
 void FilterStage::on_clock(const Message& m) {
-  const ImuSample imu = imu_sample(decode<imu_t>(m.bytes));
+  const ImuSample imu = in_axes(calibration_.q_vehicle_body(), imu_sample(decode<imu_t>(m.bytes)));
   (void)filter_->see(imu);
   const navigation::NavigationOutput out = filter_->output();
   const bool known = out.odometry.validity != Validity::kInvalid && out.odometry.t_us == imu.t_us;
-  poses_.add(imu, known ? &out.odometry : nullptr);
+  poses_.add(imu, known ? &out.imu : nullptr);
 }
 
 void FilterStage::publish(int64_t now_utime, Outputs& outputs) {

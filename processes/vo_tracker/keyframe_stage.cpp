@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <roadfix/image_t.hpp>
+#include <roadfix/ins_status_t.hpp>
 #include <roadfix/wheels_t.hpp>
 
 #include "bus/sample_codec.h"
@@ -11,7 +12,6 @@
 #include "stream/thread_pool.h"
 #include "vo_tracker/camera_rig.h"
 #include "vo_tracker/image.h"
-#include "vo_tracker/messages.h"
 
 namespace roadfix {
 namespace {
@@ -43,7 +43,7 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
       std::make_unique<KeyframeTracker>(config.keyframe, camera_rig(calibration),
                                         make_front_end(config.keyframe.front_end, superpoint_weights), *executor_);
   spec_.name = "vo_tracker";
-  spec_.state_layout = 11;
+  spec_.state_layout = 12;
   spec_.inputs = {{"CAMERA_LEFT", "image_t", 0, 0}};
   if (stereo_) spec_.inputs.push_back({"CAMERA_RIGHT", "image_t", 0, 0});
   const auto add = [this](const char* channel, const char* type, int64_t delay_us) {
@@ -52,6 +52,7 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
   };
   wheels_ = add("WHEELS", "wheels_t", kWheels_us);
   ins_ = add("POSE_INS", "pose_t", kFeedback_us);
+  ins_status_ = add("INS_STATUS", "ins_status_t", kFeedback_us);
   restart_ = add("VO_RESTART", "vo_restart_t", kFeedback_us);
   if (stereo_) spec_.clocks.push_back({kRight, kCameraLost_us});
   spec_.clocks.push_back({kLeft, kCameraLost_us});
@@ -77,7 +78,9 @@ void KeyframeStage::apply(const Message& m) {
   } else if (m.input == ins_) {
     const Odometry ins = odometry(decode<pose_t>(m.bytes));
     if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
-    if (const auto level = ins_level(ins)) tracker_->add_attitude(*level);
+    if (const auto level = ins_level(ins, mounting_)) tracker_->add_attitude(*level);
+  } else if (m.input == ins_status_) {
+    mounting_ = ins_mounting(decode<ins_status_t>(m.bytes), calibration_);
   } else if (m.input == restart_) {
     if (left_) track(*left_);
     tracker_->restart(restart(decode<vo_restart_t>(m.bytes)));
@@ -115,6 +118,8 @@ void KeyframeStage::digest(Digest& digest) const { tracker_->digest(digest); }
 std::vector<uint8_t> KeyframeStage::save() const {
   StateWriter writer;
   stamps_.save(writer);
+  writer.put(mounting_.learnt.coeffs());
+  writer.put(mounting_.roll_std);
   tracker_->save(writer);
   return writer.take();
 }
@@ -126,10 +131,14 @@ void KeyframeStage::load(std::span<const uint8_t> state) {
   StateReader reader(state);
   TimestampFilter stamps = stamps_;
   stamps.load(reader);
+  InsMounting mounting;
+  reader.get(mounting.learnt.coeffs());
+  reader.get(mounting.roll_std);
   loaded->load(reader);
   reader.finish();
   tracker_ = std::move(loaded);
   stamps_ = stamps;
+  mounting_ = mounting;
   left_.reset();
   tracked_ = map_started_ = false;
 }

@@ -9,6 +9,7 @@
 #include "camera/timestamp_filter.h"
 #include "stream/executor.h"
 #include "vo_tracker/handler.h"
+#include "vo_tracker/messages.h"
 
 namespace roadfix {
 
@@ -42,7 +43,8 @@ class KeyframeStage final : public Stage {
   std::vector<uint8_t> superpoint_weights_;
   StageSpec spec_;
   bool stereo_;
-  int wheels_ = 0, ins_ = 0, restart_ = 0;  ///< indices of these inputs
+  int wheels_ = 0, ins_ = 0, ins_status_ = 0, restart_ = 0;  ///< indices of these inputs
+  InsMounting mounting_;
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<KeyframeTracker> tracker_;
   std::unique_ptr<CameraFrame> left_;  ///< waits for its right image until the end of the tick

@@ -5,6 +5,7 @@
 #include "bus/sample_codec.h"
 #include "bus/track_codec.h"
 #include "features/track_noise.h"
+#include "geometry/euler.h"
 
 namespace roadfix {
 namespace {
@@ -197,10 +198,17 @@ std::optional<SpeedSample> ins_speed(const Odometry& o) {
                      sigma / std::max(kSlow, speed)};
 }
 
-std::optional<AttitudeSample> ins_level(const Odometry& o) {
-  const double variance = std::max(o.cov_pose(3, 3), o.cov_pose(4, 4));  // rotation in vehicle axes: roll, pitch
+InsMounting ins_mounting(const ins_status_t& m, const Calibration& calibration) {
+  const Eigen::Quaterniond q_vehicle_body = quaternion({m.mounting_rad[2], m.mounting_rad[1], m.mounting_rad[0]});
+  return {q_vehicle_body * calibration.q_vehicle_body().conjugate(), m.mounting_std_rad[0]};
+}
+
+std::optional<AttitudeSample> ins_level(const Odometry& o, const InsMounting& mounting) {
+  // Rotation in vehicle axes: roll, without what is the mounting's alone, and pitch.
+  const double roll = o.cov_pose(3, 3) - mounting.roll_std * mounting.roll_std;
+  const double variance = std::max(roll, o.cov_pose(4, 4));
   if (o.validity == Validity::kInvalid || !o.T_frame_vehicle.q.coeffs().allFinite() || !(variance > 0.0)) return {};
-  return AttitudeSample{o.t_us, o.T_frame_vehicle.q, std::sqrt(variance)};
+  return AttitudeSample{o.t_us, o.T_frame_vehicle.q * mounting.learnt, std::sqrt(variance)};
 }
 
 }  // namespace roadfix

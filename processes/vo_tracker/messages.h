@@ -1,6 +1,7 @@
 /// Conversion between messages and lib/slam: units and enums only.
 #pragma once
 
+#include <roadfix/ins_status_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/vo_features2_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
@@ -30,6 +31,13 @@ Restart restart(const vo_restart_t& message);
 /// Vehicle speed; no value where the sample has none.
 std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels);
 std::optional<SpeedSample> ins_speed(const Odometry& odometry);
-std::optional<AttitudeSample> ins_level(const Odometry& odometry);
+/// How the imu sits in the vehicle, to whose axes a calibration's cameras are turned by what it tells of that.
+struct InsMounting {
+  Eigen::Quaterniond learnt = Eigen::Quaterniond::Identity();  ///< of the axes told to those that the INS has found
+  double roll_std = 0.0;                                       ///< rad, which no INS finds
+};
+InsMounting ins_mounting(const ins_status_t& status, const Calibration& calibration);
+/// Attitude of the axes that the cameras' places are told in.
+std::optional<AttitudeSample> ins_level(const Odometry& odometry, const InsMounting& mounting);
 
 }  // namespace roadfix

@@ -21,10 +21,10 @@ namespace {
 enum Input { kImu = 0, kWheels = 1, kMag = 2, kStart = 3 };
 using Sample = std::variant<ImuSample, WheelSample, MagSample>;
 
-Sample sample_of(const Message& message) {
+Sample sample_of(const Message& message, const Eigen::Quaterniond& q_vehicle_body) {
   switch (message.input) {
     case kImu:
-      return imu_sample(decode<imu_t>(message.bytes));
+      return in_axes(q_vehicle_body, imu_sample(decode<imu_t>(message.bytes)));
     case kWheels:
       return wheel_sample(decode<wheels_t>(message.bytes));
     default:
@@ -53,6 +53,7 @@ class WheelOdometryStage final : public Stage {
   WheelOdometryStage(const Calibration& calibration, const WheelOdometryConfig& config)
       : config_(config),
         calibration_(calibration_text(calibration)),
+        q_vehicle_body_(calibration.q_vehicle_body()),
         on_rear_axle_(calibration.body_origin == BodyOrigin::kRearAxle),
         slot_(config.publish_period),
         odometry_({wheel_sensors(calibration), config.odometry}) {
@@ -71,10 +72,12 @@ class WheelOdometryStage final : public Stage {
   void apply(const Message& message) override {
     if (message.input == kStart) return restore(decode<state_t>(message.bytes).state);
     while (!pending_.empty() && pending_.front().utime <= message.utime) pending_.pop_front();
-    add(odometry_, sample_of(message));
+    add(odometry_, sample_of(message, q_vehicle_body_));
   }
 
-  void on_clock(const Message& message) override { pending_.push_back({message.utime, sample_of(message)}); }
+  void on_clock(const Message& message) override {
+    pending_.push_back({message.utime, sample_of(message, q_vehicle_body_)});
+  }
 
   void publish(int64_t now_utime, Outputs& outputs) override {
     if (!slot_.due(now_utime)) return;
@@ -152,6 +155,7 @@ class WheelOdometryStage final : public Stage {
 
   WheelOdometryConfig config_;
   std::string calibration_;
+  Eigen::Quaterniond q_vehicle_body_;  ///< as far as the calibration knows it
   bool on_rear_axle_;
   PublishSlot slot_;
   StageSpec spec_;
@@ -168,7 +172,8 @@ void take_walk(const std::optional<double>& sigma, const std::optional<double>& 
 
 }  // namespace
 
-WheelSensors wheel_sensors(const Calibration& calibration) {
+WheelSensors wheel_sensors(const Calibration& told) {
+  const Calibration calibration = told.in_vehicle_axes();
   WheelSensors s;
   if (const auto& imu = calibration.sensors.imu) {
     take_known(imu->gyro_noise, s.gyro_noise);
@@ -192,9 +197,6 @@ WheelSensors wheel_sensors(const Calibration& calibration) {
     if (mag->hard_iron) s.hard_iron = kMicrotesla * *mag->hard_iron;
     take_known(mag->soft_iron, s.soft_iron);
   }
-  const Eigen::Vector3d forward = calibration.forward_in_body();
-  s.mounting_yaw = std::atan2(forward.y(), forward.x());
-  s.mounting_pitch = std::asin(-forward.z());
   if (calibration.mounting && calibration.mounting->std_deg) s.mounting_std = kDegree * *calibration.mounting->std_deg;
   return s;
 }

@@ -2,6 +2,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 #include <roadfix/image_t.hpp>
+#include <roadfix/ins_status_t.hpp>
 #include <roadfix/vo_restart_t.hpp>
 
 #include "support/pull_away.h"
@@ -10,7 +11,7 @@
 namespace roadfix::test {
 namespace {
 
-constexpr int64_t kFrame_us = 100'000, kWheels_us = 20'000, kIns_us = 50'000;
+constexpr int64_t kFrame_us = 100'000, kWheels_us = 20'000, kIns_us = 50'000, kStatus_us = 200'000;
 constexpr int64_t kEnd_us = static_cast<int64_t>(kPictureDrive_s * 1e6);
 constexpr double kBaseline = 0.5;
 constexpr PullAway kCar{1.0, 4.0, 6.0};
@@ -43,6 +44,13 @@ pose_t ins(int64_t t) {
   m.validity = pose_t::VALIDITY_VALID;
   m.velocity_mps[0] = kCar.speed(seconds(t));
   for (int i = 0; i < 3; ++i) m.cov_velocity_m2ps2[i][i] = 0.01;
+  for (int i = 3; i < 5; ++i) m.cov_pose_m2_rad2[i][i] = 2e-6;
+  return m;
+}
+
+ins_status_t ins_status() {
+  ins_status_t m{};
+  m.mounting_std_rad[0] = 1e-3;
   return m;
 }
 
@@ -62,6 +70,7 @@ std::vector<DriveMessage> make() {
     all.push_back(drive_message("IMU", utime, t / PullAway::kImu_us, kCar.imu(t)));
     if (t % kWheels_us == 0) all.push_back(drive_message("WHEELS", utime, t / kWheels_us, wheels(t)));
     if (t % kIns_us == 0) all.push_back(drive_message("POSE_INS", utime, t / kIns_us, ins(t)));
+    if (t % kStatus_us == 0) all.push_back(drive_message("INS_STATUS", utime, t / kStatus_us, ins_status()));
     if (t == 1'150'000) all.push_back(drive_message("VO_RESTART", utime, 0, restart()));
     if (t % kFrame_us != 0) continue;
     const int64_t i = t / kFrame_us;

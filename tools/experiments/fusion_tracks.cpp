@@ -79,7 +79,7 @@ class TracksStage final : public Stage {
     } else if (m.input == 2) {
       const Odometry ins = odometry(decode<pose_t>(m.bytes));
       if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
-      if (const auto level = ins_level(ins)) tracker_->add_attitude(*level);
+      if (const auto level = ins_level(ins, {})) tracker_->add_attitude(*level);
     } else {
       tracker_->restart(restart(decode<vo_restart_t>(m.bytes)));
     }

@@ -17,7 +17,6 @@ constexpr double kEvery = 1.0;     // s between two attempts
 constexpr double kLevel = 0.5;     // s from the beginning, whose mean specific force is taken for gravity
 // m/s along the vehicle: a guess that is too low approaches the truth from below, one too high overshoots beyond zero.
 constexpr double kGuess = 6.0, kGuessStd = 15.0;
-constexpr double kMountingKnown = 0.5;                // rad; known worse, nobody knows which way is ahead
 constexpr double kLeastTilt = 0.1;                    // rad, of a road and a lean
 constexpr double kKnownShare = 0.1, kKnownStd = 1.0;  // of the speed; m/s: of the speed at the end, at most
 constexpr double kHopeless = 0.5;                     // likewise: nothing has told it
@@ -65,8 +64,7 @@ MovingStart::Beginning MovingStart::guess(const NavigationConfig& config) const 
     if (seconds_between(imu_.front().t_us, s.t_us) < kLevel) force += s.accel;
   b.up = force.normalized();
   const VehicleFacts& facts = config.facts;
-  if (facts.mounting_std.tail<2>().maxCoeff() < kMountingKnown)
-    b.velocity = kGuess * (vehicle::R_imu_vehicle(facts.mounting) * Eigen::Vector3d::UnitX());
+  if (facts.mounting_known()) b.velocity = kGuess * (vehicle::R_imu_vehicle(facts.mounting) * Eigen::Vector3d::UnitX());
   b.sensors.mounting = facts.mounting;
   b.sensors.p_imu_axle = facts.p_imu_axle;
   b.sensors.p_imu_antenna = facts.p_imu_antenna;
@@ -98,9 +96,9 @@ MovingStart::Started MovingStart::go_through(const NavigationConfig& config, con
   state.x = course;
   // The velocity is known in vehicle axes, whatever the attitude is: nu = R du, free of phi.
   Eigen::Vector3d spread = Eigen::Vector3d::Constant(kGuessStd);
-  const double mounting_std = config.facts.mounting_std.tail<2>().maxCoeff();
-  if (mounting_std < kMountingKnown)
-    spread.tail<2>().setConstant(vehicle::kAside + (vehicle::kAsideShare + mounting_std) * kGuessStd);
+  if (const VehicleFacts& facts = config.facts; facts.mounting_known())
+    spread.tail<2>().setConstant(vehicle::kAside +
+                                 (vehicle::kAsideShare + facts.mounting_std.tail<2>().maxCoeff()) * kGuessStd);
   const Eigen::Matrix3d R = q.toRotationMatrix() * vehicle::R_imu_vehicle(config.facts.mounting);
   const Eigen::Matrix3d cov = R * spread.cwiseAbs2().asDiagonal() * R.transpose();
   state.P().block<3, 3>(kVel, kVel) = 0.5 * (cov + cov.transpose());

@@ -26,8 +26,9 @@ std::vector<std::string> chosen_channels(const EvaluationRequest& request, const
 }
 
 EstimateInput estimate_input(const std::string& channel, PoseStream stream, const PoseStream& reference,
-                             const EvaluationLog& truth, EvaluationReport& report) {
+                             const EvaluationLog& log, const EvaluationLog& truth, EvaluationReport& report) {
   if (reference.anchor) move_to_anchor(stream, *reference.anchor);
+  turn_to_imu_axes(channel, log, truth.calibration, stream);
   EstimateInput input;
   input.channel = channel;
   input.local_frame = stream.local_frame || reference.local_frame;
@@ -84,7 +85,7 @@ EvaluationReport evaluate_log(const EvaluationRequest& request) {
   }
   const PoseStream& reference = truth.poses.at("REFERENCE");
   for (const std::string& channel : chosen_channels(request, log)) {
-    EstimateInput input = estimate_input(channel, std::move(log.poses.at(channel)), reference, truth, report);
+    EstimateInput input = estimate_input(channel, std::move(log.poses.at(channel)), reference, log, truth, report);
     if (channel == "POSE_FUSED") input.modes = log.fusion.modes;
     input.protection = std::move(log.protection[channel]);
     report.channels.push_back(

@@ -14,6 +14,7 @@
 #include "geometry/frames.h"
 #include "roadfix/aiding_t.hpp"
 #include "roadfix/config_t.hpp"
+#include "roadfix/ins_status_t.hpp"
 #include "roadfix/protection_level_t.hpp"
 
 namespace roadfix {
@@ -127,6 +128,7 @@ ProtectionSample protection_of(const protection_level_t& m) {
   return sample;
 }
 constexpr const char* kAidingChannel = "AIDING_INS";
+constexpr const char* kStatusChannel = "INS_STATUS";
 
 /// The checks of the types that are read here.
 struct Checks {
@@ -135,6 +137,7 @@ struct Checks {
   MessageCheck fusion = Schema::built_in().check_of("fusion_state2_t");
   MessageCheck protection = Schema::built_in().check_of("protection_level_t");
   MessageCheck aiding = Schema::built_in().check_of("aiding_t");
+  MessageCheck status = Schema::built_in().check_of("ins_status_t");
 };
 
 /// Collects what a log holds: add() takes note of an event and says whether it is a message of its channel's type;
@@ -150,11 +153,13 @@ class LogCollector {
     if (channel == kReferenceChannel || channel.starts_with("POSE_")) log_.pose_channels.insert(channel);
     const bool protection = channel.starts_with(kProtection);
     const bool aiding = channel == kAidingChannel;
-    if (!is_pose(channel) && !config && !fusion && !protection && !aiding) return true;
+    const bool status = channel == kStatusChannel;
+    if (!is_pose(channel) && !config && !fusion && !protection && !aiding && !status) return true;
     const MessageCheck& check = config       ? checks_.config
                                 : fusion     ? checks_.fusion
                                 : protection ? checks_.protection
                                 : aiding     ? checks_.aiding
+                                : status     ? checks_.status
                                              : checks_.pose;
     if (check(event.data) != CheckResult::kOk) return false;
     const Header header = *read_header(event.data);
@@ -177,6 +182,8 @@ class LogCollector {
         } else if (channel.starts_with(kProtection)) {
           log_.protection["POSE_" + channel.substr(kProtection.size())].push_back(
               protection_of(decode<protection_level_t>(event.data)));
+        } else if (channel == kStatusChannel) {
+          log_.mounting.add(decode<ins_status_t>(event.data));
         } else if (channel == kAidingChannel) {
           const aiding_t aiding = decode<aiding_t>(event.data);
           if (aiding.source == aiding_t::SOURCE_GNSS_POSITION && aiding.status == aiding_t::STATUS_ACCEPTED)
@@ -209,7 +216,9 @@ class LogCollector {
 
   [[nodiscard]] bool is_pose(const std::string& channel) const {
     if (channel == kReferenceChannel) return true;
-    if (channel == "CONFIG_DRIVE" || channel == "FUSION_STATE" || channel == kAidingChannel) return false;
+    if (channel == "CONFIG_DRIVE" || channel == "FUSION_STATE" || channel == kAidingChannel ||
+        channel == kStatusChannel)
+      return false;
     return channels_.empty() ? channel.starts_with("POSE_") : channels_.contains(channel);
   }
 
@@ -289,6 +298,16 @@ void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {
   const SE3 T = T_enu_enu(anchor, *stream.anchor);
   for (Odometry& pose : stream.trajectory.poses) transform(T, pose);
   stream.anchor = anchor;
+}
+
+void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const Calibration& calibration,
+                      PoseStream& stream) {
+  const Eigen::Quaterniond told = calibration.q_vehicle_body();
+  const bool learnt = channel == "POSE_INS" || channel == "POSE_FUSED";
+  for (Odometry& pose : stream.trajectory.poses) {
+    const Eigen::Quaterniond q_vehicle_imu = learnt ? log.mounting.at(pose.t_us, told) : told;
+    if (!q_vehicle_imu.vec().isZero(0.0)) pose = in_axes(q_vehicle_imu, pose);
+  }
 }
 
 Reference reference_of(const EvaluationLog& log, const std::filesystem::path& path) {

@@ -12,6 +12,7 @@
 #include "config/calibration.h"
 #include "evaluation/evaluate.h"
 #include "roadfix/evaluate/fusion_series.h"
+#include "roadfix/evaluate/mounting_series.h"
 #include "roadfix/pose_t.hpp"
 
 namespace roadfix {
@@ -42,12 +43,13 @@ struct EvaluationLog {
   std::set<std::string> pose_channels;      ///< POSE_* and REFERENCE that the log holds, read or not
   std::map<std::string, std::vector<ProtectionSample>> protection;  ///< by the channel of the poses that it bounds
   FusionSeries fusion;
+  MountingSeries mounting;
   std::vector<int64_t> accepted_fixes_us;  ///< of the INS, by AIDING_INS
   std::vector<std::string> notes;          ///< what a reader of the figures must know: damage, missing facts
 };
 
-/// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE and FUSION_STATE, each in
-/// the order of its messages' own time. Throws LogError where the file is no log of ours.
+/// Reads the pose channels in `channels` (all POSE_* where empty), REFERENCE, CONFIG_DRIVE, INS_STATUS and FUSION_STATE,
+/// each in the order of its messages' own time. Throws LogError where the file is no log of ours.
 EvaluationLog read_evaluation_log(const std::filesystem::path& path, const std::set<std::string>& channels);
 
 /// The poses of `channel`. Throws where there are none, naming the channels that have some.
@@ -56,10 +58,15 @@ const PoseStream& poses_of(const EvaluationLog& log, const std::string& channel,
 /// The stream in another ENU frame; a local stream stays as it is.
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor);
 
+/// Poses of the vehicle's axes turned into the imu's, those of references and calibrations. The navigation filter has
+/// learnt how they lie (POSE_FUSED repeats it); the others have what the calibration tells.
+void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const Calibration& calibration,
+                      PoseStream& stream);
+
 /// The reference of a log, with what may be scored of it. Throws where there is none.
 Reference reference_of(const EvaluationLog& log, const std::filesystem::path& path);
 
-/// From the stream's point of the vehicle to the reference's, vehicle axes; a note where the calibration has none.
+/// From the stream's point of the vehicle to the reference's, imu axes; a note where the calibration has none.
 Eigen::Vector3d lever_arm_between(int8_t from_origin, int8_t to_origin, const Calibration& calibration,
                                   std::vector<std::string>& notes);
 

@@ -55,11 +55,25 @@ TEST_CASE("a full calibration is read and written without loss") {
   CHECK(c.sensors.stereo->focal_std == 0.001);
   CHECK(c.mounting->std_deg->z() == 3.0);
   // Turned to the right by 30 degrees, the imu sees the car go to its left.
-  CHECK(c.forward_in_body().y() > 0.45);
-  CHECK((exp_so3(Eigen::Vector3d(0.0, c.turn_to_forward()[0], c.turn_to_forward()[1])).col(0) - c.forward_in_body())
-            .norm() < 1e-12);
+  CHECK((c.q_vehicle_body().conjugate() * Eigen::Vector3d::UnitX()).y() > 0.45);
   const std::string text = calibration_text(c);
   CHECK(calibration_text(parse_calibration(text, "again")) == text);
+}
+
+TEST_CASE("places and turns can be had in the vehicle's axes") {
+  const Calibration body = parse_calibration(kFull, "calibration.yaml"), vehicle = body.in_vehicle_axes();
+  const Eigen::Quaterniond turn = body.q_vehicle_body();
+  CHECK((*vehicle.sensors.gnss->lever_arm - turn * *body.sensors.gnss->lever_arm).norm() < 1e-12);
+  CHECK((vehicle.rear_axle().p - turn * body.rear_axle().p).norm() < 1e-12);
+  const SE3 T = body.sensors.camera_left->mounting->T_body_camera(),
+            T_turned = vehicle.sensors.camera_left->mounting->T_body_camera();
+  CHECK(T_turned.q.angularDistance(turn * T.q) < 1e-7);
+  CHECK((T_turned.p - turn * T.p).norm() < 1e-12);
+  CHECK(turn.angularDistance(Eigen::Quaterniond::Identity()) > 0.4);  // teeth
+  // What is turned has nothing left to turn, and is known as well.
+  CHECK(vehicle.q_vehicle_body().vec().isZero(0.0));
+  CHECK(vehicle.mounting->std_deg == body.mounting->std_deg);
+  CHECK(calibration_text(vehicle.in_vehicle_axes()) == calibration_text(vehicle));
 }
 
 TEST_CASE("what a calibration does not say is unknown") {

@@ -82,7 +82,7 @@ inline Score drive_through(const SimulatedDrive& drive, const std::vector<WheelS
     const NavigationOutput o = filter.output();
     if (o.odometry.validity == Validity::kInvalid) continue;
     ++n;
-    const Eigen::Vector2d e = navtest::error_of(filter, o.odometry, drive).head<2>();
+    const Eigen::Vector2d e = navtest::error_of(filter, o.imu, drive).head<2>();
     out.h += e.squaredNorm();
     const double squares = e.dot(o.odometry.cov_pose.topLeftCorner<2, 2>().inverse() * e);
     inside += squares < 11.8;  // chi-square, 3 sigma, 2 axes

@@ -49,7 +49,7 @@ Outcome drive_all(double noise_factor, const std::function<void(NavigationConfig
       f.clear_records();
       if (done || seconds_between(start, now) < kEpoch) return;
       done = true;
-      const Odometry o = f.output().odometry;
+      const Odometry o = f.output().imu;
       if (o.validity == Validity::kInvalid) return;
       const Eigen::Matrix<double, 9, 1> e = error_of(f, o, drive);
       const auto add = [&](ConsistencyAccumulator& to, const Eigen::Vector3d& error, const Eigen::Matrix3d& cov) {

@@ -44,7 +44,7 @@ Parked park(WheelSigns signs, const std::function<void(WheelSample&)>& relabel) 
   std::erase_if(samples.gnss, [&](const GnssFix& fix) { return fix.t_us > end - 60'000'000; });
   Navigation filter(navtest::filter_config(s));
   navtest::run(filter, samples, [](Navigation& f, int64_t) { f.clear_records(); });
-  const Odometry o = filter.output().odometry;
+  const Odometry o = filter.output().imu;
   return {navtest::error_of(filter, o, drive).head<2>().norm(), std::sqrt(o.cov_pose.topLeftCorner<2, 2>().trace())};
 }
 

@@ -44,7 +44,7 @@ Worst drive_with(const char* fault, double duration_s, uint64_t seed, const char
     worst.valid_at_end = o.odometry.validity == Validity::kValid;
     worst.gnss_reason = f.status().gnss_reason;
     if (o.odometry.validity == Validity::kInvalid) return;
-    const double e = error_of(f, o.odometry, drive).head<2>().norm();
+    const double e = error_of(f, o.imu, drive).head<2>().norm();
     const double sigma = std::sqrt(o.odometry.cov_pose(0, 0) + o.odometry.cov_pose(1, 1));
     worst.last = e;
     worst.horizontal = std::max(worst.horizontal, e);

@@ -118,7 +118,7 @@ struct LevelScore {
       f.clear_records();
       if (now < next || now > last) return;
       next += 500'000;
-      const Odometry o = f.output().odometry;
+      const Odometry o = f.output().imu;
       const auto e = error_of(f, o, drive);
       for (int i = 0; i < 2; ++i) {
         inside += e(i) * e(i) <= 9.0 * o.cov_pose(i, i);

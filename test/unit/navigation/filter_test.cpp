@@ -36,7 +36,7 @@ Final drive_it(const SimulatedDrive& drive, const navtest::Samples& samples) {
   last.output = filter.output();
   last.status = filter.status();
   if (filter.filter() != nullptr) last.core = *filter.filter();
-  if (filter.anchor()) last.error = navtest::error_of(filter, last.output.odometry, drive);
+  if (filter.anchor()) last.error = navtest::error_of(filter, last.output.imu, drive);
   return last;
 }
 

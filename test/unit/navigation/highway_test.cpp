@@ -42,7 +42,7 @@ Drift drive(uint64_t seed, double accel_gain) {
     const Eigen::Vector3d p = d.drive.truth_at(o.odometry.t_us).T_frame_vehicle.p;
     r.way += (p - before).norm();  // long curves: a chord of ten seconds is the way but for a thousandth
     before = p;
-    const Eigen::Vector3d e = test::error_of(o.odometry, d).head<3>();
+    const Eigen::Vector3d e = test::error_of(o.imu, d).head<3>();
     const Eigen::Vector3d std = o.odometry.cov_pose.diagonal().head<3>().cwiseSqrt();
     const Eigen::Vector3d sigmas = e.cwiseQuotient(std).cwiseAbs();
     r.sigmas = sigmas.maxCoeff();

@@ -204,8 +204,8 @@ Tied tied(double fixes_s, int eyes, const std::function<void(GnssFix&, double)>&
     if (out.first_s < 0.0) out.first_s = t;
     if (o.local) CHECK_FALSE(filter.anchor());
     const bool tied_now = local && !o.local;
-    if (tied_now && velocity) out.jump_mps = (o.odometry.velocity - *velocity).norm();
-    velocity = o.odometry.velocity;
+    if (tied_now && velocity) out.jump_mps = (o.imu.velocity - *velocity).norm();
+    velocity = o.imu.velocity;
     local = o.local;
     if (o.local) continue;
     const Odometry truth = d.drive.truth_at(t_us);
@@ -215,8 +215,8 @@ Tied tied(double fixes_s, int eyes, const std::function<void(GnssFix&, double)>&
     const Eigen::Quaterniond q = truth.T_frame_vehicle.q * d.drive.errors.q_vehicle_imu;
     if (tied_now) {
       out.tied_s = t;
-      const double off = wrap_angle(yaw_of(o.odometry.T_frame_vehicle.q) - yaw_of(q));
-      out.heading_off = std::abs(off) / std::sqrt(o.odometry.cov_pose(5, 5));
+      const double off = wrap_angle(yaw_of(o.imu.T_frame_vehicle.q) - yaw_of(q));
+      out.heading_off = std::abs(off) / std::sqrt(o.imu.cov_pose(5, 5));
     }
     const Eigen::Vector3d error = o.odometry.T_frame_vehicle.p - place;
     out.end_m = error.head<2>().norm();

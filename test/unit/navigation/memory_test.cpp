@@ -74,7 +74,7 @@ Second drive_again(const std::optional<Memory>& memory, const navtest::Samples& 
       if (out.local_after > 1e8) out.local_after = seconds_between(start, feeder.now());
       continue;
     }
-    const auto error = navtest::error_of(filter, o.odometry, cut().drive);
+    const auto error = navtest::error_of(filter, o.imu, cut().drive);
     out.yaw_end_deg = std::abs(error(5)) / kDegree;
     out.horizontal_end = error.head<2>().norm();
     out.resets = o.reset_counter;

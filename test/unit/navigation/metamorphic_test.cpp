@@ -32,7 +32,7 @@ Navigation after(const SimulatedDrive& d, const navtest::Samples& samples) {
 
 Eigen::Matrix<double, 9, 1> error_after(const SimulatedDrive& d) {
   Navigation filter = after(d, navtest::Samples(d));
-  return navtest::error_of(filter, filter.output().odometry, d);
+  return navtest::error_of(filter, filter.output().imu, d);
 }
 
 /// How far two filters' positions lie apart, whatever their anchors, m.

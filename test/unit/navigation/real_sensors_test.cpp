@@ -23,7 +23,7 @@ Errors errors_of(const SimulatedDrive& drive, const NavigationConfig& config, co
     f.clear_records();
     if (now < next) return;
     next += 100'000;
-    const Eigen::Matrix<double, 9, 1> error = error_of(f, f.output().odometry, drive);
+    const Eigen::Matrix<double, 9, 1> error = error_of(f, f.output().imu, drive);
     e.horizontal += error.head<2>().squaredNorm();
     e.up += error.z() * error.z();
     ++outputs;

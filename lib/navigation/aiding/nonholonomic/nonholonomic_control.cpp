@@ -8,9 +8,7 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kMountingKnown =
-    0.5;                             // rad; known worse, it is no row along the state: a rig that is no part of a car
-constexpr double kLearnSpeed = 2.0;  // m/s
+constexpr double kLearnSpeed = 2.0;       // m/s
 constexpr int64_t kDueEarly_us = 20'000;  // so that an interval of whole wheel periods is not missed by jitter
 
 /// Tyres slip with the lateral acceleration, springs give with any horizontal one.
@@ -27,7 +25,7 @@ bool NonholonomicControl::joins(bool wheels, int64_t t_us) {
 }
 
 bool NonholonomicControl::due(int axis, int64_t t_us) {
-  if (!config_.sources.nonholonomic || config_.facts.mounting_std.tail<2>().maxCoeff() > kMountingKnown) return false;
+  if (!config_.sources.nonholonomic || !config_.facts.mounting_known()) return false;
   int64_t& next = next_us_[static_cast<size_t>(axis - 1)];
   if (t_us < next) return false;
   next = t_us + static_cast<int64_t>(1e6 * interval(axis)) - kDueEarly_us;

@@ -109,7 +109,7 @@ TEST_CASE("INS_STATUS tells how old wheel speeds are, and how far the IMU's cloc
   config.facts.time_offset_std = config.facts.wheel_latency_std = 0.05;
   navigation::Navigation filter(config);
   navtest::run(filter, navtest::Samples(drive), [](navigation::Navigation& f, int64_t) { f.clear_records(); });
-  const ins_status_t told = ins_status(filter.status(), filter.filter(), config.facts);
+  const ins_status_t told = ins_status(filter.status(), filter.filter(), config.facts, Eigen::Quaterniond::Identity());
   CHECK(told.wheel_latency_std_s < 0.01);
   CHECK(std::abs(told.wheel_latency_s - 0.05) < 3.0 * told.wheel_latency_std_s);
   CHECK(told.imu_time_offset_std_s < 0.02);

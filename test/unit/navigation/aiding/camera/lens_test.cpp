@@ -50,7 +50,7 @@ Outcome drive_all(int drives, double off, double told, double told4 = 1.0) {
     const int learnt = told == 0.0 ? 0 : told4 == 0.0 ? 2 : 3;
     const Eigen::MatrixXd P = s.P().block(kLens, kLens, learnt, learnt);
     if (learnt > 0) out.lens.add(e.head(learnt).dot(P.inverse() * e.head(learnt)), learnt);
-    const Odometry o = filter.output().odometry;
+    const Odometry o = filter.output().imu;
     const Eigen::Vector3d dv = test::error_of(o, d).tail<3>();
     out.velocity.add(dv.dot(o.cov_velocity.inverse() * dv), 3);
   }

@@ -6,25 +6,14 @@
 #include "roadfix/evaluate/evaluation_log.h"
 #include "roadfix/evaluate/report.h"
 #include "roadfix/protection_level_t.hpp"
+#include "support/temporary_folder.h"
 #include "unit/processes/roadfix/evaluate/small_log.h"
 
 namespace roadfix {
 namespace {
 
 using test::SmallLog;
-
-class Folder {
- public:
-  explicit Folder(const std::string& name)
-      : path_(std::filesystem::temp_directory_path() / ("roadfix_" + name + "_" + std::to_string(::getpid()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
+using test::TemporaryFolder;
 
 void keep(double, pose_t&) {}
 
@@ -44,16 +33,16 @@ EvaluationReport evaluate_all(const std::filesystem::path& path, const Evaluatio
 }
 
 TEST_CASE("a log is read back to the figures that were put in") {
-  const Folder folder("report");
+  const TemporaryFolder folder;
   const SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     small.write_estimate(writer, "POSE_INS", [](double, pose_t& m) { m.position_m[2] += 0.25; });
     small.write_estimate(writer, "POSE_LOCAL", [](double, pose_t& m) { m.frame = pose_t::FRAME_LOCAL; });
     writer.commit();
   }
-  const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  const EvaluationReport report = evaluate_all((folder / "out.lcm"));
   REQUIRE(report.channels.size() == 2);
   const auto json = report_json(report);
   const auto& ins = json["channels"]["POSE_INS"];
@@ -82,24 +71,24 @@ TEST_CASE("a log is read back to the figures that were put in") {
 }
 
 TEST_CASE("what is left without slow errors is said beside the figures as published, by its window") {
-  const Folder folder("slow");
+  const TemporaryFolder folder;
   const SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     small.write_estimate(writer, "POSE_INS", [](double, pose_t& m) { m.position_m[2] += 0.25; });
     writer.commit();
   }
   EvaluationOptions options;
   options.slow_window = 20.0;
-  const EvaluationReport report = evaluate_all(folder.file("out.lcm"), options);
+  const EvaluationReport report = evaluate_all((folder / "out.lcm"), options);
   const auto json = report_json(report);
   const auto& ins = json["channels"]["POSE_INS"];
   CHECK(ins["slow_removed"]["window_s"] == 20.0);
   CHECK(ins["slow_removed"]["ate_rmse_m"].get<double>() < 0.01);
   CHECK(ins["ate_rmse_m"].get<double>() == Approx(0.25));
   CHECK(report_table(report).find("without errors slower than 20 s") != std::string::npos);
-  CHECK(!report_json(evaluate_all(folder.file("out.lcm")))["channels"]["POSE_INS"].contains("slow_removed"));
+  CHECK(!report_json(evaluate_all((folder / "out.lcm")))["channels"]["POSE_INS"].contains("slow_removed"));
 }
 
 /// The page's data: what stands between `begin` and the next end of a script element.
@@ -112,10 +101,10 @@ nlohmann::json page_data(const std::string& page, const std::string& id) {
 }
 
 TEST_CASE("the page has errors beside their protection levels over time, and Stanford diagrams of each axis") {
-  const Folder folder("levels");
+  const TemporaryFolder folder;
   const SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     small.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
       m.position_m[2] += t_s > 100.0 && t_s < 101.0 ? 3.0 : 0.25;
@@ -133,7 +122,7 @@ TEST_CASE("the page has errors beside their protection levels over time, and Sta
     });
     writer.commit();
   }
-  const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  const EvaluationReport report = evaluate_all((folder / "out.lcm"));
   const std::string page = report_page(report);
   const nlohmann::json plots = page_data(page, "plots"), channel = plots["channels"][0], levels = channel["levels"];
   CHECK(levels["risks"] == nlohmann::json{1e-3, 1e-5});
@@ -152,23 +141,23 @@ TEST_CASE("the page has errors beside their protection levels over time, and Sta
 }
 
 TEST_CASE("an estimate without covariance is said to have none") {
-  const Folder folder("covariance");
+  const TemporaryFolder folder;
   const SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     small.write_estimate(writer, "POSE_VO", [](double, pose_t& m) {
       for (auto& row : m.cov_pose_m2_rad2) std::fill(row, row + 6, 0.0);
     });
     writer.commit();
   }
-  const EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  const EvaluationReport report = evaluate_all((folder / "out.lcm"));
   CHECK(report.channels[0].consistency.position.unusable == report.channels[0].pairs);
   CHECK(report_table(report).find("covariance: none") != std::string::npos);
 }
 
 TEST_CASE("an estimate in another ENU frame lands on the reference") {
-  const Folder folder("anchors");
+  const TemporaryFolder folder;
   const SmallLog small;
   SmallLog far = small;
   far.anchor = {small.anchor.latitude + 2e-4, small.anchor.longitude - 3e-4, small.anchor.height + 30.0};
@@ -176,7 +165,7 @@ TEST_CASE("an estimate in another ENU frame lands on the reference") {
   const EnuAnchor there(far.anchor);
   const Eigen::Matrix3d R = there.R_ecef_enu().transpose() * here.R_ecef_enu();
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     far.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
       const SE3 T = test::eight(t_s).T_frame_vehicle;
@@ -188,7 +177,7 @@ TEST_CASE("an estimate in another ENU frame lands on the reference") {
     });
     writer.commit();
   }
-  EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  EvaluationLog log = read_evaluation_log(folder / "out.lcm", {});
   PoseStream& stream = log.poses.at("POSE_INS");
   CHECK(stream.trajectory.poses[0].T_frame_vehicle.p.norm() > 1000.0);
   move_to_anchor(stream, *log.poses.at("REFERENCE").anchor);
@@ -200,9 +189,9 @@ TEST_CASE("an estimate in another ENU frame lands on the reference") {
 TEST_CASE("poses that are invalid before there is an anchor give the channel none") {
   const SmallLog small;
   const auto read_with_start = [&](int8_t validity) {
-    const Folder folder("no_anchor_yet");
+    const TemporaryFolder folder;
     {
-      LogWriter writer(folder.file("out.lcm"));
+      LogWriter writer(folder / "out.lcm");
       small.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
         if (t_s > 7.0) return;  // as long as the filter waits for a fix
         m.anchor_lat_deg = m.anchor_lon_deg = m.anchor_height_m = 0.0;
@@ -210,7 +199,7 @@ TEST_CASE("poses that are invalid before there is an anchor give the channel non
       });
       writer.commit();
     }
-    return read_evaluation_log(folder.file("out.lcm"), {"POSE_INS"}).poses.at("POSE_INS");
+    return read_evaluation_log(folder / "out.lcm", {"POSE_INS"}).poses.at("POSE_INS");
   };
   const PoseStream stream = read_with_start(pose_t::VALIDITY_INVALID);
   CHECK(stream.anchor->latitude == Approx(small.anchor.latitude).epsilon(1e-12));
@@ -225,13 +214,13 @@ TEST_CASE("poses that are invalid before there is an anchor give the channel non
 }
 
 TEST_CASE("lever arms come from the calibration, and a missing one is said") {
-  const Folder folder("levers");
+  const TemporaryFolder folder;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     SmallLog().write_drive(writer);
     writer.commit();
   }
-  const EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  const EvaluationLog log = read_evaluation_log(folder / "out.lcm", {});
   std::vector<std::string> notes;
   CHECK(lever_arm_between(pose_t::ORIGIN_IMU, pose_t::ORIGIN_ANTENNA, log.calibration, notes) ==
         Eigen::Vector3d(1.0, 0.5, 1.5));
@@ -241,10 +230,10 @@ TEST_CASE("lever arms come from the calibration, and a missing one is said") {
 }
 
 TEST_CASE("a repeated stretch, a change of frame and bytes that are no message are left out and said") {
-  const Folder folder("broken");
+  const TemporaryFolder folder;
   const SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     small.write_estimate(writer, "POSE_VO", [](double t_s, pose_t& m) {
       if (t_s < 10.0) m.frame = pose_t::FRAME_LOCAL;
@@ -254,7 +243,7 @@ TEST_CASE("a repeated stretch, a change of frame and bytes that are no message a
     writer.write("POSE_VO", test::kStart_us, junk);
     writer.commit();
   }
-  const EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
+  const EvaluationLog log = read_evaluation_log(folder / "out.lcm", {});
   const PoseStream& stream = log.poses.at("POSE_VO");
   CHECK(stream.backward == 5001);
   CHECK(stream.other_frame == 200);
@@ -265,10 +254,10 @@ TEST_CASE("a repeated stretch, a change of frame and bytes that are no message a
 }
 
 TEST_CASE("the order of the events in a log changes no figure, and a stray stamp only its own message") {
-  const Folder folder("order");
+  const TemporaryFolder folder;
   const SmallLog small;
   {
-    LogWriter writer(folder.file("in.lcm"));
+    LogWriter writer(folder / "in.lcm");
     small.write_drive(writer);
     int64_t seq = 0;
     small.write_estimate(writer, "POSE_INS", [&](double t_s, pose_t& m) {
@@ -282,16 +271,16 @@ TEST_CASE("the order of the events in a log changes no figure, and a stray stamp
     std::vector<uint8_t> bytes;
   };
   std::vector<Event> events;
-  LogReader reader(folder.file("in.lcm"));
+  LogReader reader((folder / "in.lcm"));
   while (const auto event = reader.next())
     events.push_back({std::string(event->channel), {event->data.begin(), event->data.end()}});
   const auto figures = [&](const std::string& name) {
     {
-      LogWriter writer(folder.file(name));
+      LogWriter writer((folder / name));
       for (const Event& event : events) writer.write(event.channel, read_header(event.bytes)->utime, event.bytes);
       writer.commit();
     }
-    return report_json(evaluate_all(folder.file(name)));
+    return report_json(evaluate_all((folder / name)));
   };
   const auto in_order = figures("a.lcm");
   std::mt19937 random(5);
@@ -313,21 +302,21 @@ TEST_CASE("the order of the events in a log changes no figure, and a stray stamp
 }
 
 TEST_CASE("a name that is no text is shown as far as it is one") {
-  const Folder folder("text");
+  const TemporaryFolder folder;
   SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     writer.commit();
   }
-  EvaluationReport report = evaluate_all(folder.file("out.lcm"));
+  EvaluationReport report = evaluate_all((folder / "out.lcm"));
   report.facts.name = "drive \xB8";
   report.notes = {"note \xFF"};
   CHECK_THAT(report_page(report), Catch::Contains("drive "));
 }
 
 TEST_CASE("modes and weights come from the fusion's state by name") {
-  const Folder folder("fusion");
+  const TemporaryFolder folder;
   fusion_state2_t state{};
   state.num_modes = 2;
   state.mode_name = {"constant_acceleration", "constant_turn"};
@@ -346,7 +335,7 @@ TEST_CASE("modes and weights come from the fusion's state by name") {
     }
   };
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     set_channels({"POSE_INS"}, {1.0});
     writer.write("FUSION_STATE", 1, encode(state));
     set_channels({"POSE_INS", "POSE_VO"}, {0.4, 0.6});
@@ -354,7 +343,7 @@ TEST_CASE("modes and weights come from the fusion's state by name") {
     writer.write("FUSION_STATE", 5, encode(state));
     writer.commit();
   }
-  const FusionSeries fusion = read_evaluation_log(folder.file("out.lcm"), {}).fusion;
+  const FusionSeries fusion = read_evaluation_log(folder / "out.lcm", {}).fusion;
   REQUIRE(fusion.modes.size() == 2);
   CHECK(fusion.modes[1].turn_probability == 0.75);
   CHECK(fusion.modes[1].t_us == 5);
@@ -363,27 +352,27 @@ TEST_CASE("modes and weights come from the fusion's state by name") {
 }
 
 TEST_CASE("a log without a reference is an error that names the file") {
-  const Folder folder("no_reference");
+  const TemporaryFolder folder;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     SmallLog().write_estimate(writer, "POSE_INS", keep);
     writer.commit();
   }
-  const EvaluationLog log = read_evaluation_log(folder.file("out.lcm"), {});
-  CHECK_THROWS_WITH(reference_of(log, folder.file("out.lcm")),
+  const EvaluationLog log = read_evaluation_log(folder / "out.lcm", {});
+  CHECK_THROWS_WITH(reference_of(log, (folder / "out.lcm")),
                     Catch::Contains("out.lcm") && Catch::Contains("REFERENCE"));
 }
 
 TEST_CASE("withheld and unscorable references are told by reason and validity") {
-  const Folder folder("flags");
+  const TemporaryFolder folder;
   SmallLog small;
   {
-    LogWriter writer(folder.file("out.lcm"));
+    LogWriter writer(folder / "out.lcm");
     small.write_drive(writer);
     writer.commit();
   }
   {
-    LogWriter writer(folder.file("flagged.lcm"));
+    LogWriter writer(folder / "flagged.lcm");
     for (int i = 0; i < 10; ++i) {
       pose_t m = test::pose_message(test::eight(0.1 * i), small.anchor);
       if (i % 2 == 0) m.reason = kWithheld;
@@ -392,7 +381,7 @@ TEST_CASE("withheld and unscorable references are told by reason and validity") 
     }
     writer.commit();
   }
-  const Reference reference = reference_of(read_evaluation_log(folder.file("flagged.lcm"), {}), "flagged.lcm");
+  const Reference reference = reference_of(read_evaluation_log(folder / "flagged.lcm", {}), "flagged.lcm");
   CHECK(reference.flags[2].withheld);
   CHECK_FALSE(reference.flags[1].withheld);
   CHECK_FALSE(reference.flags[3].may_score);
