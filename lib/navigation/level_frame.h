@@ -34,6 +34,9 @@ class LevelFrame {
   void leave_local();
   /// A measurement of a receiver in a local frame; true: the filter's state is in enu from now on.
   bool tie(const Queued& q, Filter& filter);
+  /// What somebody told of place and heading does it at once; `ahead`: s from the filter's epoch to that moment. The state
+  /// has the heading with that, and is open about the place yet.
+  void tie(const PriorPose& told, double ahead, Filter& filter);
   /// Time has passed unmeasured: the way so far ties nothing.
   void restart_tie() { tie_.restart(); }
 
@@ -47,6 +50,9 @@ class LevelFrame {
   }
 
  private:
+  void tie(const Geodetic& anchor, const FrameTie::Turn& turn, const Eigen::Vector3d& local_place,
+           const Eigen::Vector3d& place, Filter& filter);
+
   NavigationConfig config_;
   FrameTie tie_;
   std::optional<Geodetic> anchor_;

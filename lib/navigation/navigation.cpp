@@ -109,6 +109,30 @@ void Navigation::add(const TrackPicture& picture, int64_t id) {
   if (CameraControl* camera = aiding_.camera()) camera->add(picture, id);
 }
 
+void Navigation::add(const PriorPose& told, int64_t id) {
+  aiding_.prior_pose().add(told, id, log_);
+  use_prior_pose();
+}
+
+void Navigation::use_prior_pose() {
+  PriorPoseControl& prior = aiding_.prior_pose();
+  if (!prior.waits() || filter() == nullptr) return;
+  const auto place = [&] { return EnuAnchor(*frame_.anchor()).enu(prior.told().place); };
+  if (start_.phase() == Phase::kHeading) return prior.try_on(start_.hypotheses(), place(), log_);
+  const SE3 before = pose_of(filter_->state().x);
+  if (!frame_.local()) {
+    if (!prior.use(*filter_, place(), log_)) return;
+  } else {
+    const std::optional<double> ahead = prior.ahead(filter_->state().x);
+    if (!ahead) return prior.drop(log_);
+    frame_.tie(prior.told(), *ahead, *filter_);
+    start_.see_tie(filter_->state().x, motion_.last_us());
+    prior.use_place(*filter_, place(), log_);
+  }
+  resets_.count(before, filter_->state().x);
+  output_.clear();
+}
+
 void Navigation::advance_to(int64_t horizon_us) {
   while (const std::optional<MotionInput::Step> now = motion_.next(horizon_us)) step(*now);
 }
@@ -116,6 +140,7 @@ void Navigation::advance_to(int64_t horizon_us) {
 void Navigation::step(const MotionInput::Step& now) {
   start_.see(now.imu, aiding_.camera() != nullptr);
   if (now.dt <= 0.0) return;
+  use_prior_pose();
   if (now.gap) {
     // What was measured inside the gap is of a time that the state skips.
     forget_before(now.imu.t_us - static_cast<int64_t>(1e6 * config_.process.max_gap));

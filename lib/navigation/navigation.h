@@ -34,6 +34,8 @@ class Navigation {
   void add(const WheelSample& wheels, int64_t id = 0);
   void add(const MagSample& mag, int64_t id = 0);
   void add(const TrackPicture& picture, int64_t id = 0);
+  /// Used as soon as there is a state; of a local frame it makes enu at once.
+  void add(const PriorPose& told, int64_t id = 0);
 
   /// Nothing before the first fix, and in a local frame.
   [[nodiscard]] std::optional<Geodetic> anchor() const { return frame_.anchor(); }
@@ -72,6 +74,7 @@ class Navigation {
   void update(const MotionInput::Step& now);
   void use(const Queued& q);
   bool tie_frame(const Queued& q);
+  void use_prior_pose();
   void predict_output();
 
   void run_leader();

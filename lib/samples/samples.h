@@ -31,6 +31,15 @@ struct GnssVelocity {
   Eigen::Matrix3d cov_enu = Eigen::Matrix3d::Zero();  ///< m2/s2
 };
 
+/// Where somebody says that the vehicle is: a person, a map of parking places, a fleet's memory.
+struct PriorPose {
+  int64_t t_us = 0;
+  Geodetic place;                                     ///< of the imu
+  Eigen::Matrix3d cov_enu = Eigen::Matrix3d::Zero();  ///< m2
+  double yaw = 0.0;                                   ///< rad, of the vehicle's x axis, counterclockwise from east
+  double yaw_std = 0.0;                               ///< rad
+};
+
 struct GnssHeading {
   double heading = 0.0;  ///< rad, of the vehicle's x axis, clockwise from true north
   double sigma = 0.0;    ///< rad

@@ -22,7 +22,7 @@ namespace {
 
 constexpr int64_t kTracksLateness_us = 200'000;  // exposure, transport, tracking
 
-enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4, kTracks = 5 };
+enum Input { kImu = 0, kGnss = 1, kWheels = 2, kMag = 3, kStart = 4, kPrior = 5, kTracks = 6 };
 enum Output { kPose = 0, kStatus = 1, kAiding = 2 };
 
 class GnssInsStage final : public Stage {
@@ -40,14 +40,12 @@ class GnssInsStage final : public Stage {
       filter_config_.sources.magnetic_heading = false;
     filter_.emplace(filter_config_);
     spec_.name = "gnss_ins_ekf";
-    spec_.inputs = {{"IMU", "imu_t", 0, 0},
-                    {"GNSS", "gnss_t", 250'000, 0},
-                    {"WHEELS", "wheels_t", 50'000, 0},
-                    {"MAG", "mag_t", 50'000, 0},
-                    {"START_GNSS_INS_EKF", "state_t", 0, 0}};
+    spec_.inputs = {
+        {"IMU", "imu_t", 0, 0},      {"GNSS", "gnss_t", 250'000, 0},          {"WHEELS", "wheels_t", 50'000, 0},
+        {"MAG", "mag_t", 50'000, 0}, {"START_GNSS_INS_EKF", "state_t", 0, 0}, {"PRIOR_POSE", "pose_t", 250'000, 0}};
     if (filter_config_.sources.camera && filter_config_.facts.camera)
       spec_.inputs.push_back({"VO_FEATURES", "vo_features2_t", kTracksLateness_us, 0});
-    spec_.state_layout = 35;
+    spec_.state_layout = 36;
     // A car without an IMU is driven by its wheels.
     spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};
@@ -68,6 +66,9 @@ class GnssInsStage final : public Stage {
         break;
       case kWheels:
         filter_->add(wheel_sample(decode<wheels_t>(m.bytes)), m.seq);
+        break;
+      case kPrior:
+        filter_->add(prior_pose(decode<pose_t>(m.bytes)), m.seq);
         break;
       case kTracks:
         filter_->add(track_picture(decode<vo_features2_t>(m.bytes)), m.seq);

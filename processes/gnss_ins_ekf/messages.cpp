@@ -132,6 +132,19 @@ GnssFix gnss_fix(const gnss_t& m) {
   return f;
 }
 
+PriorPose prior_pose(const pose_t& m) {
+  PriorPose p;
+  p.t_us = m.utime;
+  if (m.frame != pose_t::FRAME_ENU || m.origin != pose_t::ORIGIN_IMU) return p;
+  const EnuAnchor anchor({m.anchor_lat_deg * kDegree, m.anchor_lon_deg * kDegree, m.anchor_height_m});
+  const Odometry told = odometry(m);
+  p.place = anchor.geodetic(told.T_frame_vehicle.p);
+  p.cov_enu = told.cov_pose.topLeftCorner<3, 3>();
+  p.yaw = yaw_of(told.T_frame_vehicle.q);
+  p.yaw_std = std::sqrt(told.cov_pose(5, 5));
+  return p;
+}
+
 void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose) {
   fill_pose(output.odometry, pose);
   pose.frame = output.local ? pose_t::FRAME_LOCAL : pose_t::FRAME_ENU;

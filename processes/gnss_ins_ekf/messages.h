@@ -11,6 +11,8 @@
 namespace roadfix {
 
 GnssFix gnss_fix(const gnss_t& message);
+/// Of a pose in enu whose origin is the imu; any other becomes one that claims nothing, which the filter refuses.
+PriorPose prior_pose(const pose_t& message);
 void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose);
 /// q_vehicle_body: by which samples and facts were turned before the filter got them.
 ins_status_t ins_status(const navigation::NavigationStatus& status, const navigation::Filter* filter,

@@ -24,7 +24,7 @@ constexpr std::array<const char*, 5> kHealthWords = {"silent", "invalid", "froze
 
 using Row = std::pair<const char*, const char*>;
 /// The first prefix that fits.
-constexpr std::array<Row, 22> kTypes = {{{"IMU", "imu_t"},
+constexpr std::array<Row, 23> kTypes = {{{"IMU", "imu_t"},
                                          {"GNSS", "gnss_t"},
                                          {"WHEELS", "wheels_t"},
                                          {"MAG", "mag_t"},
@@ -38,6 +38,7 @@ constexpr std::array<Row, 22> kTypes = {{{"IMU", "imu_t"},
                                          {"VO_STATUS", "vo_status_t"},
                                          {"VO_FEATURES", "vo_features2_t"},
                                          {"VO_RESTART", "vo_restart_t"},
+                                         {"PRIOR_POSE", "pose_t"},
                                          {"FUSION_STATE", "fusion_state2_t"},
                                          {"HEALTH", "health_t"},
                                          {"HEARTBEAT_", "heartbeat_t"},

@@ -16,6 +16,7 @@ void add_import_command(CLI::App& app);
 void add_kalibr_command(CLI::App& calibrate);
 void add_log_command(CLI::App& app);
 void add_paper_command(CLI::App& app);
+void add_place_command(CLI::App& app);
 void add_replay_command(CLI::App& app);
 void add_run_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);

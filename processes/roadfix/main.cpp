@@ -71,6 +71,7 @@ int main(int argc, char** argv) {
   roadfix::add_import_command(app);
   roadfix::add_log_command(app);
   roadfix::add_paper_command(app);
+  roadfix::add_place_command(app);
   roadfix::add_replay_command(app);
   roadfix::add_run_command(app);
   roadfix::add_simulate_command(app);

@@ -52,12 +52,28 @@ const std::vector<DriveMessage>& demo() {
   return kDemo;
 }
 
+/// Where the first fix was, give or take: somebody who knows no better than the filter.
+DriveMessage rough_prior_pose(const std::vector<DriveMessage>& drive, int64_t utime) {
+  const auto fix = std::find_if(drive.begin(), drive.end(), [](const DriveMessage& m) { return m.channel == "GNSS"; });
+  const gnss_t first = decode<gnss_t>(fix->bytes);
+  pose_t m{};
+  m.anchor_lat_deg = first.lat_deg;
+  m.anchor_lon_deg = first.lon_deg;
+  m.anchor_height_m = first.height_m;
+  m.q_wxyz[0] = 1.0;
+  for (int i = 0; i < 6; ++i) m.cov_pose_m2_rad2[i][i] = i < 3 ? 1e4 : 4.0;
+  return drive_message("PRIOR_POSE", utime, 0, m);
+}
+
 /// The same drive once more, with tracks in place of its pictures.
 const std::vector<DriveMessage>& demo_with_tracks() {
   static const std::vector<DriveMessage> kDemo = [] {
     ScenarioConfig config = scenario("demo");
     config.duration_s = kDemo_s;
-    return track_messages(make_track_drive(config, 1, with_noise_of_pictures({})), kFewTracks);
+    std::vector<DriveMessage> all = track_messages(make_track_drive(config, 1, with_noise_of_pictures({})), kFewTracks);
+    all.push_back(rough_prior_pose(all, all.front().header.utime + 10'000'000));
+    sort_by_utime(all);
+    return all;
   }();
   return kDemo;
 }

@@ -20,7 +20,8 @@ Aiding::Aiding(const NavigationConfig& config)
       gnss_velocity_(config),
       wheel_speed_(config),
       nonholonomic_(config),
-      zero_motion_(config) {
+      zero_motion_(config),
+      prior_pose_(config) {
   if (config.facts.has_imu && config.sources.camera && config.facts.camera)
     camera_.emplace(config.camera, *config.facts.camera);
 }

@@ -7,6 +7,7 @@
 #include "navigation/aiding/gnss_position/gnss_position_control.h"
 #include "navigation/aiding/gnss_velocity/gnss_velocity_control.h"
 #include "navigation/aiding/nonholonomic/nonholonomic_control.h"
+#include "navigation/aiding/prior_pose/prior_pose_control.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_control.h"
 #include "navigation/aiding/zero_motion/zero_motion_control.h"
 #include "navigation/motion/motion_input.h"
@@ -35,6 +36,8 @@ class Aiding {
   [[nodiscard]] const ZeroMotionControl& zero_motion() const { return zero_motion_; }
   [[nodiscard]] GnssPositionControl& gnss_position() { return gnss_position_; }
   [[nodiscard]] const GnssPositionControl& gnss_position() const { return gnss_position_; }
+  [[nodiscard]] PriorPoseControl& prior_pose() { return prior_pose_; }
+  [[nodiscard]] const PriorPoseControl& prior_pose() const { return prior_pose_; }
   /// Null where no camera is used.
   [[nodiscard]] CameraControl* camera() { return camera_ ? &*camera_ : nullptr; }
   [[nodiscard]] const CameraControl* camera() const { return camera_ ? &*camera_ : nullptr; }
@@ -51,6 +54,7 @@ class Aiding {
     gnss_velocity_.serialise(a);
     wheel_speed_.serialise(a);
     nonholonomic_.serialise(a);
+    prior_pose_.serialise(a);
     if (camera_) camera_->serialise(a);
     a(wheel_steps_, arm_contradicted_);
   }
@@ -67,6 +71,7 @@ class Aiding {
   WheelSpeedControl wheel_speed_;
   NonholonomicControl nonholonomic_;
   ZeroMotionControl zero_motion_;
+  PriorPoseControl prior_pose_;
   std::optional<CameraControl> camera_;  ///< where there is one that is to be used
   int64_t wheel_steps_ = 0;
   bool arm_contradicted_ = false;

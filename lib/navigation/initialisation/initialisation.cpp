@@ -42,13 +42,14 @@ std::optional<Initialisation::Start> Initialisation::attempt(const MotionInput::
     phase_ = Phase::kHeading;
     return Start{};
   }
-  return may_start_locally(t_us, frame) ? start_locally(now, motion, aiding.camera()) : std::nullopt;
+  return may_start_locally(t_us, aiding, frame) ? start_locally(now, motion, aiding.camera()) : std::nullopt;
 }
 
 /// Where no fix has ever come: one that has was of a place in enu, which a local frame would forget. A car that is at rest may
 /// drive off any moment, and what rest tells is lost then.
-bool Initialisation::may_start_locally(int64_t t_us, const LevelFrame& frame) const {
+bool Initialisation::may_start_locally(int64_t t_us, const Aiding& aiding, const LevelFrame& frame) const {
   if (!config_.facts.has_imu || frame.anchor()) return false;
+  if (aiding.prior_pose().waits()) return true;
   const double wait = alignment_.remembers_heading() ? kNoFixWait : kFixInterval;
   return !config_.facts.has_receiver || alignment_.waited(t_us) >= wait;
 }

@@ -75,7 +75,7 @@ class Initialisation {
   }
 
  private:
-  [[nodiscard]] bool may_start_locally(int64_t t_us, const LevelFrame& frame) const;
+  [[nodiscard]] bool may_start_locally(int64_t t_us, const Aiding& aiding, const LevelFrame& frame) const;
   [[nodiscard]] std::optional<Start> start_locally(const MotionInput::Step& now, const MotionInput& motion,
                                                    const CameraControl* camera);
   [[nodiscard]] std::optional<Start> start_moving(int64_t t_us, const MotionInput& motion, const CameraControl& camera);

@@ -7,6 +7,7 @@
 #include "navigation/aiding/gnss_velocity/gnss_velocity_model.h"
 #include "navigation/aiding/magnetic_heading/magnetic_heading_model.h"
 #include "navigation/aiding/nonholonomic/nonholonomic_model.h"
+#include "navigation/aiding/prior_pose/prior_pose_model.h"
 #include "navigation/aiding/second_order.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_model.h"
 #include "navigation/aiding/wheel_yaw_rate/wheel_yaw_rate_model.h"
@@ -86,6 +87,13 @@ TEST_CASE("GNSS velocity Jacobian") {
 
 TEST_CASE("GNSS heading Jacobian") {
   check_everywhere<1>([](const State& s, const BodyMotion&) { return gnss_heading(s, 0.4, 0.01); });
+}
+
+TEST_CASE("prior pose Jacobians") {
+  check_everywhere<3>([](const State& s, const BodyMotion&) {
+    return prior_place(s, Eigen::Vector3d(3.0, -4.0, 1.0), Eigen::Matrix3d::Identity(), 0.2);
+  });
+  check_everywhere<1>([](const State& s, const BodyMotion&) { return prior_heading(s, 0.4, 0.1); });
 }
 
 TEST_CASE("magnetic heading Jacobian") {
