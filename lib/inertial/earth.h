@@ -10,6 +10,8 @@
 
 namespace roadfix::inertial {
 
+inline constexpr double kStandardGravity = 9.80665;  ///< m/s2 (CGPM 1901)
+
 class Earth {
  public:
   Earth() = default;
@@ -31,8 +33,7 @@ class Earth {
   }
 
  private:
-  static constexpr double kGravityStep = 10.0;         // m
-  static constexpr double kStandardGravity = 9.80665;  // m/s2 (CGPM 1901)
+  static constexpr double kGravityStep = 10.0;  // m
 
   bool anchored_ = false;
   EnuAnchor anchor_{Geodetic()};

@@ -7,6 +7,10 @@
 
 namespace roadfix::inertial {
 
+/// What biases and scales change by from one turn-on to the next, as a share of the spread that a calibration gives (assumed;
+/// temperature, load, tyre pressure).
+inline constexpr double kTurnOnChange = 0.3;
+
 /// Densities of the white noise.
 struct ImuNoise {
   double gyro = 0.0;   ///< rad/s/sqrt(Hz)

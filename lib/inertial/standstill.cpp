@@ -1,4 +1,5 @@
 #include "inertial/standstill.h"
+#include "statistics/chance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +10,7 @@ namespace {
 
 constexpr double kEngineRate = 2e-3;   // rad/s, by which an idling engine moves a quarter's mean
 constexpr double kEngineForce = 0.03;  // m/s2, likewise
-constexpr double kNoiseSigmas = 3.0;
-constexpr int kManyBlocks = 1000;  // count no further
+constexpr int kManyBlocks = 1000;      // count no further
 
 }  // namespace
 
@@ -38,8 +38,8 @@ void StandstillDetector::finish_block(int64_t t_us, const ImuNoise& noise, bool 
   sums_.setZero();
   times_.setZero();
   const double root = std::sqrt(duration / kQuarters);
-  const bool calm = block_.gyro_spread < kEngineRate + kNoiseSigmas * noise.gyro / root &&
-                    block_.accel_spread < kEngineForce + kNoiseSigmas * noise.accel / root;
+  const bool calm = block_.gyro_spread < kEngineRate + kChance * noise.gyro / root &&
+                    block_.accel_spread < kEngineForce + kChance * noise.accel / root;
   calm_blocks_ = calm && !frozen ? std::min(calm_blocks_ + 1, kManyBlocks) : 0;
 }
 

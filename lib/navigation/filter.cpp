@@ -6,13 +6,14 @@
 #include <span>
 
 #include "geometry/so3.h"
+#include "statistics/chance.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kShownSigmas = 3.0;  // of latencies, that the state waits for
-constexpr int kMostConsidered = 8;    // states: the receiver's and the imu's clocks, an antenna
+constexpr int kMostConsidered = 8;  // states: the receiver's and the imu's clocks, an antenna
 
 }  // namespace
 
@@ -215,8 +216,8 @@ AidingRecord Filter::fuse(AidingSource source, int64_t t_us, const Measurement<R
   if (state_.held()) flush();
   const AidingRecord record = judge(source, t_us, m, gate);
   // Of slow wheels a scale does not show, and the noise of speeds without a sign is rectified.
-  constexpr double kSlow = 2.0;  // m/s
-  const bool slow = source == AidingSource::kWheelSpeed && state_.x.nav.velocity.squaredNorm() < kSlow * kSlow;
+  const bool slow =
+      source == AidingSource::kWheelSpeed && state_.x.nav.velocity.squaredNorm() < vehicle::kSlow * vehicle::kSlow;
   if (record.status == AidingStatus::kGated && !slow) reject(m);
   if (record.status != AidingStatus::kAccepted) return record;
   flush();
@@ -269,11 +270,11 @@ double Filter::longest_age(bool wheels) const {
         std::pair{kWheelLatency, x.wheel_latency}}) {
     if (at == kWheelLatency && !wheels) continue;
     const double variance = P(at, at) + P(kImuOffset, kImuOffset) - 2.0 * P(at, kImuOffset);
-    longest = std::max(longest, value - x.imu_offset + kShownSigmas * std::sqrt(std::max(variance, 0.0)));
+    longest = std::max(longest, value - x.imu_offset + kChance * std::sqrt(std::max(variance, 0.0)));
   }
   if (state_.has_camera()) {
     const double sigma = std::sqrt(state_.P()(kCameraOffset, kCameraOffset));
-    longest = std::max(longest, kShownSigmas * sigma - x.camera_offset);
+    longest = std::max(longest, kChance * sigma - x.camera_offset);
   }
   return longest;
 }

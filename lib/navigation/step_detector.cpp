@@ -146,7 +146,7 @@ void StepDetector::begin_after(State& state, const BodyMotion& motion, double se
 
 void StepDetector::begin_at_surprise(State& state, const BodyMotion& motion, double whitened_square, int rows) {
   const int64_t t_us = state.x.t_us;
-  if (!watches_ || whitened_square < kMostSquare + rows) return;
+  if (!watches_ || whitened_square < kChance * kChance + rows) return;
   const bool of_a_run = t_us < surprised_us_ + kRun_us;
   surprised_us_ = t_us;
   if (of_a_run && whitened_square < kMoreOf * surprise_) return;
@@ -207,7 +207,7 @@ void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen
                          bool antenna) {
   // Robust weight, as of Huber's estimator: single outliers decide nothing, those that agree with each other do.
   const double square = whitened.squaredNorm(), rows = static_cast<double>(whitened.size());
-  const double weight = std::min(1.0, kMostSquare * rows / square);
+  const double weight = std::min(1.0, kChance * kChance * rows / square);
   for (int m = 0; m <= (antenna && !displaced_ ? kStart : kStart - 1); ++m) {
     const int n = width(m);
     const auto g = G.middleCols(first(m), n);

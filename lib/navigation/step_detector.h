@@ -13,6 +13,7 @@
 #include "navigation/body_motion.h"
 #include "navigation/config.h"
 #include "navigation/state.h"
+#include "statistics/chance.h"
 
 namespace roadfix::navigation {
 
@@ -87,7 +88,7 @@ class StepDetector {
     auto G = explained(state, H, L);
     state.carried().topRows(state.size()).noalias() -= Y.lazyProduct(G);
     if (!counts) return;
-    usual_ += kUsualGain * (std::min(whitened.squaredNorm() / Rows, kMostSquare) - usual_);
+    usual_ += kUsualGain * (std::min(whitened.squaredNorm() / Rows, kChance * kChance) - usual_);
     weigh(G, whitened, antenna);
   }
   /// A measurement that the filter rejected.
@@ -121,7 +122,6 @@ class StepDetector {
 
  private:
   static constexpr double kUsualGain = 0.01;  // ten seconds of wheel speeds
-  static constexpr double kMostSquare = 9.0;  // one innovation counts at most as three sigma
   using Square = Eigen::Matrix<double, kWidth, kWidth>;
   template <class Archive>
   static void serialise(Archive& a, Square& information, int size) {

@@ -5,16 +5,16 @@
 #include <cmath>
 
 #include "geometry/so3.h"
+#include "statistics/chance.h"
 
 namespace roadfix {
 namespace {
 
 constexpr std::array<double, 4> kGateFactor{8.0, 4.0, 2.0, 1.0};  ///< annealed gate, as in pose_solver.cpp
 constexpr int kStepsPerRound = 4;
-constexpr double kDirectionSigma = 0.2;   ///< rad: a camera 1.5 m before the rear axle, on a circle of 7.5 m
-constexpr double kInverseDepth = 0.1;     ///< 1/m, mean of street scenes and its standard deviation
-constexpr double kBackwardsSigmas = 3.0;  ///< of negative inverse depth: the vehicle reverses
-constexpr double kMinDepthRatio = 0.2;    ///< lower limit of the depth after the motion, relative
+constexpr double kDirectionSigma = 0.2;  ///< rad: a camera 1.5 m before the rear axle, on a circle of 7.5 m
+constexpr double kInverseDepth = 0.1;    ///< 1/m, mean of street scenes and its standard deviation
+constexpr double kMinDepthRatio = 0.2;   ///< lower limit of the depth after the motion, relative
 
 using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
@@ -107,7 +107,7 @@ std::optional<BearingOnlyPose> bearing_only_pose(std::span<const Eigen::Vector2d
     ++inliers;
   }
   if (inliers < config.min_inliers || 2 * inliers < static_cast<int>(first.size())) return std::nullopt;
-  if (depth_b < -kBackwardsSigmas * std::sqrt(depth_information)) return std::nullopt;
+  if (depth_b < -kChance * std::sqrt(depth_information)) return std::nullopt;
   const Eigen::Matrix3d cov_turn = H.bottomRightCorner<3, 3>().inverse();
   const Eigen::Matrix<double, 3, 2> by_direction = -cov_turn * H.bottomLeftCorner<3, 2>();
   const double direction2 = kDirectionSigma * kDirectionSigma;

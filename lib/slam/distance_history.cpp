@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "samples/samples.h"
+#include "statistics/chance.h"
 
 namespace roadfix {
 namespace {
@@ -19,7 +20,6 @@ constexpr double kMaxCurvature = 1.0 / 7.5;
 /// Comparison interval of two sources: velocity errors of a filter last for seconds, the scale of a tyre for a drive.
 constexpr int64_t kComparison_us = 10'000'000;
 /// Sigmas below which a speed counts as noise.
-constexpr double kNoiseSigmas = 3.0;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ void DistanceHistory::add(const SpeedSample& sample) {
     const double speed = 0.5 * (last.sample.speed + sample.speed);
     const double dt_s = seconds_between(last.sample.t_us, sample.t_us);
     way = last.way + speed * dt_s;
-    path = last.path + (std::abs(speed) > kNoiseSigmas * sample.sigma ? std::abs(speed) * dt_s : 0.0);
+    path = last.path + (std::abs(speed) > kChance * sample.sigma ? std::abs(speed) * dt_s : 0.0);
   }
   marks_.push_back({sample, way, path});
   while (marks_.front().sample.t_us < sample.t_us - kKept_us) marks_.pop_front();

@@ -9,6 +9,9 @@ inline constexpr double kStandingAccel = 0.03;  ///< m/s2, by which the mean spe
 inline constexpr double kEverydayAccel = 1.5;   ///< m/s2, likewise in motion: what levelling takes for a slope
 inline constexpr double kAside = 0.1;           ///< m/s, sigma of the velocity across the vehicle,
 inline constexpr double kAsideShare = 0.05;     ///< and what sideslip adds, as a share of the speed
+inline constexpr double kSlow = 2.0;            ///< m/s: slower, neither sideslip nor a factor on the speed shows
+inline constexpr double kUnseenAccel = 2.0;     ///< m/s2, what may have happened in a while that nothing measured
+inline constexpr double kStillVelocity = 0.05;  ///< m/s, sigma of a car that seems to stand: a pixel at 10 m in 0.4 s
 inline constexpr double kLeastSpeed = 1.0;      ///< m/s: slower, its direction does not show
 
 }  // namespace roadfix::vehicle

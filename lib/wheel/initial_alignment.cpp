@@ -3,23 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "inertial/imu_noise.h"
 #include "wheel/axle_motion.h"
 #include "wheel/propagation.h"
 
 namespace roadfix {
 
 using namespace wheel;  // indices of the error state
-namespace {
-
-constexpr double kTurnOnChange = 0.3;  ///< of the calibrated bias sigma: change between two starts (assumed)
-
-}  // namespace
 
 void InitialAlignment::restore(const WheelMemory& memory) {
   const bool sane =
       memory.gyro_bias.allFinite() && memory.gyro_bias_sigma.allFinite() && memory.gyro_bias_sigma.minCoeff() >= 0.0;
   if (!sane) return;
-  const double spread = config_.sensors.gyro_bias_std, change = kTurnOnChange * spread;
+  const double spread = config_.sensors.gyro_bias_std, change = inertial::kTurnOnChange * spread;
   restored_ = true;
   prior_.gyro_bias = memory.gyro_bias;
   for (int i = 0; i < 3; ++i)

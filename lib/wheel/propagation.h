@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "inertial/earth.h"
 #include "wheel/dead_reckoning.h"
 #include "wheel/wheel_config.h"
 #include "wheel/wheel_state.h"
@@ -43,7 +44,7 @@ struct WheelNoise {
 WheelNoise process_noise(const WheelConfig& config);
 
 /// Normal gravity differs by 0.5 % between equator and pole, 0.05 m/s2: covered by the accelerometer bias.
-inline constexpr double kStandardGravity = 9.80665;
+using inertial::kStandardGravity;
 
 /// Mean after the interval, (W.5.1) to (W.5.4), and its Jacobian, (W.5.5), (W.5.6).
 WheelVector propagated_mean(const WheelVector& x, const WheelStep& step);

@@ -6,6 +6,9 @@
 
 namespace roadfix::navigation {
 
+inline constexpr double kOutage =
+    3.0;  ///< s without a receiver, after which its errors are new and compared with nothing
+
 /// The errors of positions are zero now, with these standard deviations (m, level axes), without correlation with
 /// anything else.
 void reset_gnss_bias(Filter& filter, const Eigen::Vector3d& std);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "navigation/measurement.h"
+#include "statistics/chance.h"
 
 namespace roadfix::navigation {
 
@@ -13,7 +14,7 @@ class NoiseScale {
  public:
   /// One until the excess is more than chance.
   [[nodiscard]] double variance_factor() const {
-    const double chance = kSigmas * std::sqrt(2.0 / (kAxes * std::max(seen_, 1.0)));
+    const double chance = kChance * std::sqrt(2.0 / (kAxes * std::max(seen_, 1.0)));
     return factor_ > 1.0 + std::max(chance, kExcess) ? factor_ : 1.0;
   }
 
@@ -23,7 +24,7 @@ class NoiseScale {
     if (r.dof == 0) return;
     seen_ = std::min(seen_ + 1.0, kMemory);
     const double gain = std::max(1.0 / kMemory, 1.0 / (seen_ + kPrior));
-    factor_ = std::clamp(factor_ * (1.0 + gain * (std::min(r.nis / r.dof, kMostRatio) - 1.0)), 1.0, kMost);
+    factor_ = std::clamp(factor_ * (1.0 + gain * (std::min(r.nis / r.dof, kChance * kChance) - 1.0)), 1.0, kMost);
   }
 
   template <class Archive>
@@ -32,12 +33,10 @@ class NoiseScale {
   }
 
  private:
-  static constexpr double kMemory = 100.0;   // measurements
-  static constexpr double kPrior = 10.0;     // measurements that the claim counts for
-  static constexpr double kMostRatio = 9.0;  // one measurement counts at most as three sigma
+  static constexpr double kMemory = 100.0;  // measurements
+  static constexpr double kPrior = 10.0;    // measurements that the claim counts for
   static constexpr double kMost = 1e4;
   static constexpr double kExcess = 0.3;
-  static constexpr double kSigmas = 3.0;  // of the factor's own scatter that are chance
   static constexpr double kAxes = 3.0;
 
   double factor_ = 1.0;

@@ -5,12 +5,6 @@
 
 namespace roadfix::navigation {
 
-namespace {
-
-constexpr double kFixSpacing = 0.5;  // s, at least, between the two fixes that a start takes a velocity from
-
-}  // namespace
-
 void Alignment::add(const GnssFix& fix) {
   // Of two fixes of one moment the surer one, whichever came first.
   const auto rank = [](const GnssFix& f) {

@@ -4,6 +4,7 @@
 
 #include "geometry/so3.h"
 #include "navigation/initialisation/heading_hypotheses.h"
+#include "statistics/chance.h"
 
 namespace roadfix::navigation {
 
@@ -11,7 +12,6 @@ namespace {
 
 constexpr double kFixAge = 3.0;      // s, of a velocity or a heading beside a position
 constexpr double kSmoothing = 0.5;   // s, by which a receiver's low pass may delay its velocity
-constexpr double kSigmas = 3.0;      // by which ways and turns may differ that are the same
 constexpr double kOtherTurn = 0.26;  // rad: more than this, a difference is none of what lasts in a receiver's errors
 
 double angle_of(const Eigen::Vector3d& v) { return std::atan2(v.y(), v.x()); }
@@ -39,7 +39,7 @@ std::optional<FrameTie::Turn> FrameTie::by_velocity(const Queued& q, const Filte
                                 late * filter.motion().acceleration.head<2>().norm());
   const double speed = v.head<2>().norm();
   // Vectors that differ in length are not one velocity in two frames.
-  if (std::abs(q.value.head<2>().norm() - speed) > kSigmas * std || speed < kSigmas * std) return std::nullopt;
+  if (std::abs(q.value.head<2>().norm() - speed) > kChance * std || speed < kChance * std) return std::nullopt;
   return Turn{wrap_angle(angle_of(q.value) - angle_of(v)), std / speed};
 }
 
@@ -55,11 +55,11 @@ std::optional<FrameTie::Turn> FrameTie::by_way(const Place& now, const Filter& f
                       filter.state().x.nav.velocity.norm();
   const double std = std::hypot(std::sqrt(from_->variance + now.variance), drift, late);
   const double way = local.head<2>().norm();
-  if (std::abs(enu.head<2>().norm() - way) > kSigmas * std) {
+  if (std::abs(enu.head<2>().norm() - way) > kChance * std) {
     from_ = now;  // one of the two is no fix of this way
     return std::nullopt;
   }
-  if (way < kSigmas * std) return std::nullopt;
+  if (way < kChance * std) return std::nullopt;
   return Turn{wrap_angle(angle_of(enu) - angle_of(local)), std / way};
 }
 
@@ -91,7 +91,7 @@ std::optional<FrameTie::Turn> FrameTie::add(const Queued& q, const Filter& filte
   last_ = best_of(by_way({q.t_us, q.value, antenna, worse_variance(q.cov)}, filter), q.t_us);
   if (!before || !last_ || last_->std > config_.start.confirm_std) return std::nullopt;
   const double apart = std::abs(wrap_angle(last_->value - before->value));
-  if (apart > std::min(kOtherTurn, kSigmas * std::hypot(before->std, last_->std))) {
+  if (apart > std::min(kOtherTurn, kChance * std::hypot(before->std, last_->std))) {
     from_.reset();
     return std::nullopt;
   }

@@ -8,17 +8,26 @@
 
 namespace roadfix::navigation {
 
+struct FrameTurn {
+  double value = 0.0;  ///< rad, about the vertical: enu = turn * local
+  double std = 0.0;    ///< rad
+
+  template <class Archive>
+  void serialise(Archive& a) {
+    a(value, std);
+  }
+};
+
+/// Of the antenna, at a fix.
+struct PlaceOfFix {
+  int64_t t_us = 0;
+  Eigen::Vector3d enu = Eigen::Vector3d::Zero(), local = Eigen::Vector3d::Zero();
+  double variance = 0.0;  ///< m2, of the fix, on the worse horizontal axis
+};
+
 class FrameTie {
  public:
-  struct Turn {
-    double value = 0.0;  ///< rad, about the vertical: enu = turn * local
-    double std = 0.0;    ///< rad
-
-    template <class Archive>
-    void serialise(Archive& a) {
-      a(value, std);
-    }
-  };
+  using Turn = FrameTurn;
 
   explicit FrameTie(const NavigationConfig& config) : config_(config) {}
 
@@ -36,12 +45,7 @@ class FrameTie {
   }
 
  private:
-  /// Of the antenna, at a fix.
-  struct Place {
-    int64_t t_us = 0;
-    Eigen::Vector3d enu = Eigen::Vector3d::Zero(), local = Eigen::Vector3d::Zero();
-    double variance = 0.0;  ///< m2, of the fix, on the worse horizontal axis
-  };
+  using Place = PlaceOfFix;
 
   [[nodiscard]] std::optional<Turn> by_velocity(const Queued& q, const Filter& filter) const;
   [[nodiscard]] std::optional<Turn> by_way(const Place& now, const Filter& filter);

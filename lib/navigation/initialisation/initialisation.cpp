@@ -1,4 +1,6 @@
 #include "navigation/initialisation/initialisation.h"
+#include "statistics/chance.h"
+#include "vehicle/driving.h"
 
 #include <cmath>
 
@@ -6,7 +8,6 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kMoving = 1.0;       // m/s
 constexpr double kTieVelocity = 2.0;  // m/s, sigma: more, and a local way ties no frame
 constexpr double kFixInterval = 1.5;  // s for a first fix of a receiver that is there: they come once a second
 constexpr double kUnmoved = 0.5;      // m, m/s
@@ -118,11 +119,12 @@ bool Initialisation::may_have_turned(const Filter* filter, const LevelFrame& fra
   if (filter == nullptr || frame.local() || MotionInput::unseen_turn(dt) <= 2.0 * config_.start.heading_std)
     return false;
   const Mean& before = filter->state().x;
-  if (before.nav.velocity.norm() > kMoving) return true;
+  if (before.nav.velocity.norm() > vehicle::kLeastSpeed) return true;
   const std::optional<GnssFix>& fix = alignment_.fix();
   if (!fix || !frame.anchor() || fix->t_us <= before.t_us) return false;
   const Eigen::Vector3d way = EnuAnchor(*frame.anchor()).enu(fix->antenna) - before.nav.position;
-  return way.head<2>().norm() > kMoving * dt + 3.0 * std::sqrt(fix->cov_enu(0, 0) + fix->cov_enu(1, 1));
+  return way.head<2>().norm() >
+         vehicle::kLeastSpeed * dt + kChance * std::sqrt(fix->cov_enu(0, 0) + fix->cov_enu(1, 1));
 }
 
 }  // namespace roadfix::navigation

@@ -11,12 +11,11 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kEvery = 0.1;            // s between two attempts
-constexpr double kRestSpeed = 0.02;       // m/s, of wheels that stand
-constexpr double kRestVelocity = 0.02;    // m/s, sigma of a start where wheels say that it stands
-constexpr double kUnseenVelocity = 0.05;  // m/s, where a still picture alone does
-constexpr int kCalmBlocks = 4;            // in a row, where neither says anything
-constexpr double kLocalYaw = 1e-4;        // rad: the heading at the start is a convention
+constexpr double kEvery = 0.1;          // s between two attempts
+constexpr double kRestSpeed = 0.02;     // m/s, of wheels that stand
+constexpr double kRestVelocity = 0.02;  // m/s, sigma of a start where wheels say that it stands
+constexpr int kCalmBlocks = 4;          // in a row, where neither says anything
+constexpr double kLocalYaw = 1e-4;      // rad: the heading at the start is a convention
 
 StartState local_start(const LocalContext& c) {
   const inertial::ImuBlock& block = c.standstill.block();
@@ -48,7 +47,7 @@ std::optional<StartState> start_at_rest(const LocalContext& c) {
   s.accel_std = std::hypot(vehicle::kStandingAccel, block.accel_spread);
   // The mean of quarters that differ by so much; the rate of the Earth looks like a bias.
   s.gyro_std = std::hypot(c.config.facts.imu.gyro / std::sqrt(block.duration), kEarthRate, 0.5 * block.gyro_spread);
-  s.velocity_std = c.wheel_speed ? kRestVelocity : kUnseenVelocity;
+  s.velocity_std = c.wheel_speed ? kRestVelocity : vehicle::kStillVelocity;
   return s;
 }
 

@@ -9,9 +9,7 @@ namespace roadfix::navigation {
 
 namespace {
 
-// Of the spread that the calibration gives: what may be new at each start (assumed; temperature, load, tyre pressure).
-constexpr double kTurnOnChange = 0.3;
-constexpr double kMostSigmas = 5.0;  // of that spread, that a remembered value may be off
+constexpr double kMostSigmas = 5.0;  // of the calibration's spread, that a remembered value may be off
 
 Memory::Kept parameters(const Mean& x) {
   return local(Mean(), x, Eigen::Vector3d::Zero()).segment<Memory::kKept>(Memory::kFirst);
@@ -33,7 +31,7 @@ void recall(const Memory& memory, Mean& x, BaseVector& std) {
     const int at = Memory::kFirst + i;
     const double spread = std(at);
     d(at) = std::clamp(memory.value(i) - calibrated(i), -kMostSigmas * spread, kMostSigmas * spread);
-    std(at) = std::min(spread, std::hypot(memory.sigma(i), kTurnOnChange * spread));
+    std(at) = std::min(spread, std::hypot(memory.sigma(i), inertial::kTurnOnChange * spread));
   }
   x = retract(x, d, x.nav.position);
 }

@@ -20,8 +20,7 @@ constexpr double kGuess = 6.0, kGuessStd = 15.0;
 constexpr double kLeastTilt = 0.1;                    // rad, of a road and a lean
 constexpr double kKnownShare = 0.1, kKnownStd = 1.0;  // of the speed; m/s: of the speed at the end, at most
 constexpr double kHopeless = 0.5;                     // likewise: nothing has told it
-constexpr double kSettled = 0.3;  // of their standard deviations, by which the last pass may have moved speed and tilt
-constexpr int kSurePass = 3, kMostPasses = 8;
+constexpr int kSurePass = 3;
 
 struct Speed {
   double value = 0.0, std = 0.0;  // m/s
@@ -152,7 +151,7 @@ std::optional<MovingStart::Started> MovingStart::attempt(const NavigationConfig&
   const Beginning prior = guess(config);
   Beginning at = prior;
   double before = at.velocity.norm();
-  for (int pass = 1; pass <= kMostPasses; ++pass) {
+  for (int pass = 1; pass <= Iteration::kMostPasses; ++pass) {
     Started run = go_through(config, prior, at, pass > 1, camera, noise);
     const Speed end = speed_of(run.filter.state());
     const Eigen::Vector3d up_before = at.up;
@@ -163,7 +162,8 @@ std::optional<MovingStart::Started> MovingStart::attempt(const NavigationConfig&
         prior.velocity.norm() > 0.0 ? at.velocity.dot(prior.velocity.normalized()) : at.velocity.norm();
     if (!(ahead > vehicle::kLeastSpeed)) return std::nullopt;
     if (pass > kSurePass && end.std > kHopeless * end.value) return std::nullopt;
-    if (pass >= kSurePass && std::abs(ahead - before) < kSettled * end.std && tilted < kSettled * tilt_std) {
+    if (pass >= kSurePass && std::abs(ahead - before) < Iteration::kSettled * end.std &&
+        tilted < Iteration::kSettled * tilt_std) {
       const bool known = end.std < std::min(kKnownStd, kKnownShare * end.value);
       return known && run.camera.fits() ? std::optional(std::move(run)) : std::nullopt;
     }

@@ -6,6 +6,7 @@
 #include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"
+#include "statistics/chance.h"
 #include "vehicle/driving.h"
 
 namespace roadfix::navigation {
@@ -14,13 +15,10 @@ namespace {
 
 constexpr double kFixMaxAge = 2.5;      // s, of a fix to start from
 constexpr double kFixMaxSpacing = 6.0;  // s, between two fixes that give a velocity
-constexpr double kFixMinSpacing = 0.5;  // s
 constexpr double kParkedSlack = 3.0;    // m, by which fixes may miss the place beyond their sigma (another bay is 2.5)
 constexpr double kParkedPlace = 0.5;    // m, by which a parked car may have been rolled
 constexpr double kParkedTilt = 0.02;    // rad; more, and it stands elsewhere
-constexpr double kCarAcceleration = 2.0;    // m/s2, by which a mean velocity may differ from the present one
-constexpr double kStandingVelocity = 0.05;  // m/s
-constexpr double kStandingForce = 0.1;      // m/s2, of the mean specific force against gravity, besides biases
+constexpr double kStandingForce = 0.1;  // m/s2, of the mean specific force against gravity, besides biases
 
 struct StartVelocity {
   Eigen::Vector3d value;
@@ -34,12 +32,12 @@ std::optional<StartVelocity> start_velocity(const StartContext& c) {
     const double floor = config.aiding.velocity_default;
     const double std = std::sqrt(std::max(fix.velocity->cov_enu.diagonal().maxCoeff(), floor * floor));
     const double late = std::hypot(config.facts.velocity_latency_std, config.facts.time_offset_std);
-    return StartVelocity{fix.velocity->enu, std + kCarAcceleration * late};
+    return StartVelocity{fix.velocity->enu, std + vehicle::kUnseenAccel * late};
   }
   if (!c.fix_before) return std::nullopt;
   const GnssFix& before = *c.fix_before;
   const double spacing = seconds_between(before.t_us, fix.t_us);
-  if (spacing < kFixMinSpacing || spacing > kFixMaxSpacing) return std::nullopt;
+  if (spacing < kFixSpacing || spacing > kFixMaxSpacing) return std::nullopt;
   const double noise = std::sqrt(fix.cov_enu.diagonal().maxCoeff() + before.cov_enu.diagonal().maxCoeff());
   return StartVelocity{(c.enu->enu(fix.antenna) - c.enu->enu(before.antenna)) / spacing, noise / spacing};
 }
@@ -59,7 +57,7 @@ StartState standing_start(const StartContext& c) {
   s.mean_gyro = b.gyro;
   s.mean_accel = c.config.facts.has_imu ? b.accel : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   s.accel_std = vehicle::kStandingAccel;
-  s.velocity_std = kStandingVelocity;
+  s.velocity_std = vehicle::kStillVelocity;
   s.memory = c.memory;
   return s;
 }
@@ -90,7 +88,7 @@ std::optional<StartState> StartWithFixes::attempt(const StartContext& c) const {
     const double since =
         std::abs(age) +
         (fix.velocity && c.config.sources.gnss_velocity ? 0.0 : 0.5 * seconds_between(c.fix_before->t_us, fix.t_us));
-    s.velocity_std = v->std + kCarAcceleration * since;
+    s.velocity_std = v->std + vehicle::kUnseenAccel * since;
   }
   s.antenna = c.enu->enu(fix.antenna) + age * s.velocity;
   const double moved = s.velocity_std * std::abs(age) +
@@ -103,7 +101,8 @@ std::optional<StartState> StartWithFixes::attempt(const StartContext& c) const {
   if (c.memory && c.memory->parked && s.standing && stands_as_parked(*c.memory, c.standstill.block())) {
     const Eigen::Vector3d parked = c.enu->enu(c.memory->place) + c.memory->q_enu_imu * facts.p_imu_antenna;
     const double sigma = std::sqrt(s.antenna_cov(0, 0) + s.antenna_cov(1, 1)) + c.memory->place_sigma;
-    if ((s.antenna - parked).head<2>().norm() < kParkedSlack + 3.0 * sigma) s.parked_yaw = yaw_of(c.memory->q_enu_imu);
+    if ((s.antenna - parked).head<2>().norm() < kParkedSlack + kChance * sigma)
+      s.parked_yaw = yaw_of(c.memory->q_enu_imu);
   }
   return s;
 }

@@ -45,6 +45,8 @@ struct StartContext {
   double waited = 0.0;  ///< s since the first imu sample
 };
 
+/// s, at least, between two fixes that a velocity is taken from.
+inline constexpr double kFixSpacing = 0.5;
 /// s for a first fix, before a start without.
 inline constexpr double kNoFixWait = 5.0;
 

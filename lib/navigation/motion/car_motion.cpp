@@ -1,4 +1,5 @@
 #include "navigation/motion/car_motion.h"
+#include "statistics/chance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +11,6 @@ namespace {
 constexpr double kHole = 2.0;             // s without wheels, after which nothing is known of the way between
 constexpr double kLongestSteps = 12.0;    // s of time that pass in steps; longer is a gap
 constexpr double kCreep = 0.3;            // m/s: the heading of a car that hardly moves hardly turns
-constexpr double kRestSigmas = 3.0;       // of a speed: wheels that may be at rest
 constexpr double kUsualInterval = 0.2;    // s between yaw rates, at most
 constexpr double kRestRate = 2.0e-4;      // rad/s: a car at rest does not turn
 constexpr double kRestAfter = 0.3;        // s: the last turn of a slow wheel is long
@@ -66,7 +66,7 @@ void CarMotion::see_wheels(int64_t t_us, const vehicle::AxleSpeed& axle) {
     turning_until_us_ = t_us;
     rate_before_ = rate_;
   }
-  const bool rests = std::abs(axle.speed) < kRestSigmas * axle.sigma;
+  const bool rests = std::abs(axle.speed) < kChance * axle.sigma;
   if (!rests || hole) standing_since_us_ = 0;
   if (rests && standing_since_us_ == 0) standing_since_us_ = t_us;
 }

@@ -1,4 +1,6 @@
 #include "navigation/motion/motion_input.h"
+#include "statistics/chance.h"
+#include "vehicle/driving.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +9,11 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kMaxLag = 1.5;       // s behind the horizon, for receivers that stamp late
-constexpr double kMaxRate = 20.0;     // rad/s, more is not a car
-constexpr double kMaxForce = 200.0;   // m/s2, likewise
-constexpr double kBridgeAccel = 2.0;  // m/s2, what a car may do unseen in a gap of the imu
-constexpr double kBridgeRate = 0.2;   // rad/s
-constexpr double kClipTime = 1.0;     // s that a turn beyond the gyro's range lasts
+constexpr double kMaxLag = 1.5;      // s behind the horizon, for receivers that stamp late
+constexpr double kMaxRate = 20.0;    // rad/s, more is not a car
+constexpr double kMaxForce = 200.0;  // m/s2, likewise
+constexpr double kBridgeRate = 0.2;  // rad/s
+constexpr double kClipTime = 1.0;    // s that a turn beyond the gyro's range lasts
 
 }  // namespace
 
@@ -67,14 +68,15 @@ void MotionInput::set_lag(double lag) { lag_us_ = static_cast<int64_t>(1e6 * std
 
 void MotionInput::reset_lag() {
   const ClockPriors time(facts_);
-  set_lag(3.0 * std::hypot(std::max(time.position_latency, time.velocity_latency), time.imu_offset));
+  set_lag(kChance * std::hypot(std::max(time.position_latency, time.velocity_latency), time.imu_offset));
 }
 
 inertial::ImuNoise MotionInput::noise(int64_t t_us, double dt, double speed) const {
   if (!facts_.has_imu) return car_.noise(t_us, speed);
   inertial::ImuNoise noise = imu_noise_.noise();
   // White noise that over this time does what an unseen manoeuvre may do, (N.2.6).
-  if (dt > max_gap_ || imu_noise_.frozen()) noise = {kBridgeRate * std::sqrt(dt), kBridgeAccel * std::sqrt(dt), 0.0};
+  if (dt > max_gap_ || imu_noise_.frozen())
+    noise = {kBridgeRate * std::sqrt(dt), vehicle::kUnseenAccel * std::sqrt(dt), 0.0};
   if (imu_noise_.gyro_clipped()) noise.gyro = kBridgeRate * std::sqrt(kClipTime);
   return noise;
 }

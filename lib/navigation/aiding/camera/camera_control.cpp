@@ -5,6 +5,7 @@
 
 #include "geometry/so3.h"
 #include "navigation/aiding/camera/common_tracks.h"
+#include "statistics/chance.h"
 #include "statistics/upper_median.h"
 
 namespace roadfix::navigation {
@@ -12,8 +13,7 @@ namespace roadfix::navigation {
 namespace {
 
 // Passes of (N.6.17), the share of its standard deviations by which the last one may move, and the least of those.
-constexpr int kMostPasses = 8;
-constexpr double kSettled = 0.3, kLeastVariance = 1e-16;
+constexpr double kLeastVariance = 1e-16;
 constexpr int kEnoughTracks = 3;      // of an update, to judge the camera by
 constexpr double kLongestStep = 0.2;  // s, at most, that one picture counts for: two bad ones make no bad camera
 
@@ -124,7 +124,8 @@ std::optional<CameraControl::Flow> CameraControl::flow(int64_t t_us, const Mean&
   });
   if (moved.size() < kEnoughCommon) return std::nullopt;
   const auto count = static_cast<double>(moved.size());
-  const double noise = std::sqrt(variance / count) * (kRayleighMedian + 3.0 * kRayleighMedianStd / std::sqrt(count));
+  const double noise =
+      std::sqrt(variance / count) * (kRayleighMedian + kChance * kRayleighMedianStd / std::sqrt(count));
   return Flow{upper_median(std::move(moved)), std::hypot(kStillMotion_px, noise)};
 }
 
@@ -268,7 +269,7 @@ bool CameraControl::apply(State& state) {
 std::optional<State> CameraControl::iterate(const State& prior) {
   const int n = prior.size();
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(n);
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  for (int pass = 0; pass < Iteration::kMostPasses; ++pass) {
     State state = prior;
     state.retract(moved);
     // About these means the prior expects the errors that lead back to its own.
@@ -279,7 +280,7 @@ std::optional<State> CameraControl::iterate(const State& prior) {
     const Eigen::VectorXd step = state.expected().head(n);
     moved += step;
     const Eigen::ArrayXd sigma = state.P().diagonal().head(n).array().max(kLeastVariance).sqrt();
-    if (pass == 0 || (step.array().abs() / sigma).maxCoeff() > kSettled) continue;
+    if (pass == 0 || (step.array().abs() / sigma).maxCoeff() > Iteration::kSettled) continue;
     state.release();
     return state;
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "geometry/so3.h"
+#include "statistics/chance.h"
 
 namespace roadfix::navigation {
 
@@ -141,7 +142,7 @@ std::optional<Eigen::Vector3d> triangulate(const CameraGeometry& camera, std::sp
   for (const Eye& eye : eyes.all())
     if (eye.view.direction(f).z() < kLeastDistanceAhead) return std::nullopt;
   const double sigma = std::sqrt(information.inverse()(2, 2));
-  if (f.z() < -3.0 * sigma) return std::nullopt;  // behind infinity by more than noise explains
+  if (f.z() < -kChance * sigma) return std::nullopt;  // behind infinity by more than noise explains
   return f;
 }
 

@@ -20,6 +20,12 @@ struct TrackCounts {
   [[nodiscard]] int tried() const { return used + refused; }
 };
 
+/// Gauss-Newton over the same rows, linearised anew: done once a pass moves nothing by more than this.
+struct Iteration {
+  static constexpr int kMostPasses = 8;
+  static constexpr double kSettled = 0.3;  ///< of the states' standard deviations
+};
+
 /// What the rows are linearised at.
 struct TrackWindow {
   CameraGeometry camera;

@@ -5,12 +5,12 @@
 
 #include "navigation/aiding/gnss_error_states.h"
 #include "navigation/aiding/gnss_position/gnss_position_model.h"
+#include "statistics/chance.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kOutage = 3.0;    // s without a position, after which its errors are new
 constexpr double kForEver = 1e12;  // s
 // Of a fixed carrier phase: multipath of a few millimetres (3.5 of a usual claim of 20) lasts, and no way is known well
 // enough to show it.
@@ -30,7 +30,6 @@ constexpr double kDisplacedPrior = 0.01;    // of a run of rejected fixes
 constexpr double kDisplacedWalk = 0.5;      // m/sqrt(s), of a displacement
 constexpr double kLongestDisplaced = 60.0;  // s: for longer a receiver is seldom displaced, and the filter is wrong
 constexpr double kBack = 7.0;               // logarithm of the odds (1000 to 1) that it is no longer displaced
-constexpr double kBackSigmas = 3.0;         // of its usual error, within which a displaced height is back
 constexpr double kPatience = 3.0;           // s of rejected fixes, for which nothing is missing, and after them
 constexpr double kTooLong = 5.0;            // s of rejected fixes that agree, without a step that explains them
 constexpr double kTailFreedom = 3.0;        // Student's t: errors of filters and receivers have heavy tails
@@ -240,7 +239,7 @@ AidingRecord GnssPositionControl::use(Filter& filter, const Queued& fix) {
     bias = bias.begun();
     (void)filter.fuse(AidingSource::kGnssPosition, fix.t_us, measurement(filter, fix, bias), Gates::open().nis[3]);
     if (!displaced()) learn(fix, r);
-    if (std::abs(filter.state().x.gnss_bias.z()) < kBackSigmas * bias.std.z()) height_displaced_ = false;
+    if (std::abs(filter.state().x.gnss_bias.z()) < kChance * bias.std.z()) height_displaced_ = false;
   } else if (r.status == AidingStatus::kGated) {
     const AidingRecord level = use_level(filter, fix, bias);
     r = level.status == AidingStatus::kAccepted ? level : decide(filter, fix, bias, r);

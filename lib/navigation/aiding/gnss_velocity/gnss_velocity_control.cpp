@@ -11,7 +11,6 @@ namespace {
 constexpr LastingError kWithoutImu = {0.5, 0.5};  // nothing propagates a velocity well enough to show it
 constexpr double kSmoothing = 0.1;    // s, what is left of a receiver's low pass: its error grows with the acceleration
 constexpr int kPersistent = 8;        // rejected in a row: more than a cluster of bad ones
-constexpr double kOutage = 3.0;       // s without a velocity, over which nothing is compared
 constexpr double kTiltTime = 10.0;    // s, for which tilt and biases of an aided filter are off by the same
 constexpr double kLeastDrift = 0.01;  // m/s/sqrt(s), of a velocity that the imu carries
 

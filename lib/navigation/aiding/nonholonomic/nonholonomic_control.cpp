@@ -3,12 +3,12 @@
 #include "navigation/aiding/nonholonomic/nonholonomic_model.h"
 #include "navigation/aiding/second_order.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_control.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kLearnSpeed = 2.0;       // m/s
 constexpr int64_t kDueEarly_us = 20'000;  // so that an interval of whole wheel periods is not missed by jitter
 
 /// Tyres slip with the lateral acceleration, springs give with any horizontal one.
@@ -45,7 +45,7 @@ AidingRecord NonholonomicControl::use(Filter& filter, int axis, bool learn) {
   Measurement<1> m = nonholonomic(filter.state(), filter.motion(), axis, std);
   if (learn) add_second_order(m, filter, axis, 1.0, interval(axis));
   const AidingRecord r = filter.fuse(AidingSource::kNonholonomic, filter.state().x.t_us, m, gates_.nis[1]);
-  if (learn && filter.state().x.nav.velocity.norm() > kLearnSpeed && r.status != AidingStatus::kBadInput)
+  if (learn && filter.state().x.nav.velocity.norm() > vehicle::kSlow && r.status != AidingStatus::kBadInput)
     (axis == 1 ? lateral_ : vertical_)
         .learn({m.residual(0), r.innovation_variance[0] - std * std, std * std, r.status == AidingStatus::kAccepted},
                acceleration);

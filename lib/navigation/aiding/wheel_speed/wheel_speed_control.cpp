@@ -7,6 +7,7 @@
 #include "navigation/aiding/second_order.h"
 #include "navigation/aiding/wheel_speed/wheel_speed_model.h"
 #include "vehicle/axle_speed.h"
+#include "vehicle/driving.h"
 
 namespace roadfix::navigation {
 
@@ -16,7 +17,6 @@ namespace {
 // source's (10 %), later where it may be a wheel that spins.
 constexpr double kSoon = 0.45, kLater = 5.0;  // s
 constexpr double kTyre = 0.1, kMost = 0.5;
-constexpr double kSlow = 2.0;  // m/s, below which a factor does not show
 
 std::optional<Measurement<1>> measurement(const Filter& filter, const Queued& wheels, double interval) {
   const double ahead = wheels.ahead(filter.state().x);
@@ -51,7 +51,7 @@ AidingRecord WheelSpeedControl::use(Filter& filter, const Queued& wheels) {
 /// (N.5.7): P_s += excess^2 where rejected speeds agree on the excess.
 void WheelSpeedControl::widen_scale(Filter& filter, const Queued& wheels, const AidingRecord& r) {
   const double speed = AxleRows(filter.state(), filter.motion(), 0.0).value.x();
-  if (std::abs(speed) < kSlow) return;
+  if (std::abs(speed) < vehicle::kSlow) return;
   const double excess = r.innovation[0] / speed;
   if (rejected_++ == 0) {
     rejected_since_us_ = wheels.t_us;

@@ -10,10 +10,9 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kStandingRate = 4e-3;   // rad/s
-constexpr int kCalmBlocks = 6;           // in a row; of 5500 blocks of moving cars two at most were
-constexpr double kStillVelocity = 0.05;  // m/s, sigma of a still picture: a pixel at 10 m through 500 px in 0.4 s
-constexpr double kMayBeZero = 16.3;      // chi-square of a velocity that may be zero, three axes, 99.9 %
+constexpr double kStandingRate = 4e-3;  // rad/s
+constexpr int kCalmBlocks = 6;          // in a row; of 5500 blocks of moving cars two at most were
+constexpr double kMayBeZero = 16.3;     // chi-square of a velocity that may be zero, three axes, 99.9 %
 
 }  // namespace
 
@@ -33,7 +32,7 @@ bool ZeroMotionControl::standing(const Filter& filter, const inertial::Standstil
 }
 
 AidingRecord ZeroMotionControl::use_velocity(Filter& filter, bool gated, bool calm) const {
-  const double sigma = std::max(config_.aiding.zero_velocity_std, calm ? 0.0 : kStillVelocity);
+  const double sigma = std::max(config_.aiding.zero_velocity_std, calm ? 0.0 : vehicle::kStillVelocity);
   return filter.fuse(AidingSource::kZeroVelocity, filter.state().x.t_us, zero_velocity(filter.state(), sigma),
                      (gated ? gates_ : Gates::open()).nis[3]);
 }
