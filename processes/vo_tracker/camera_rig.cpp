@@ -23,4 +23,12 @@ CameraRig camera_rig(const Calibration& calibration) {
   return rig;
 }
 
+KeyframeTrackerConfig with_lens_of(const Calibration& calibration, KeyframeTrackerConfig config) {
+  if (const auto& left = calibration.sensors.camera_left) {
+    take_known(left->focal_std, config.focal_std);
+    take_known(left->radial_std, config.radial_std);
+  }
+  return config;
+}
+
 }  // namespace roadfix

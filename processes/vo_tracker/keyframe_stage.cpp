@@ -40,7 +40,7 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
       stamps_(calibration.sensors.camera_left ? calibration.sensors.camera_left->rate : std::nullopt) {
   fix_opencv_threads();
   tracker_ =
-      std::make_unique<KeyframeTracker>(config.keyframe, camera_rig(calibration),
+      std::make_unique<KeyframeTracker>(with_lens_of(calibration, config.keyframe), camera_rig(calibration),
                                         make_front_end(config.keyframe.front_end, superpoint_weights), *executor_);
   spec_.name = "vo_tracker";
   spec_.state_layout = 12;
@@ -126,7 +126,7 @@ std::vector<uint8_t> KeyframeStage::save() const {
 
 void KeyframeStage::load(std::span<const uint8_t> state) {
   auto loaded =
-      std::make_unique<KeyframeTracker>(config_.keyframe, camera_rig(calibration_),
+      std::make_unique<KeyframeTracker>(with_lens_of(calibration_, config_.keyframe), camera_rig(calibration_),
                                         make_front_end(config_.keyframe.front_end, superpoint_weights_), *executor_);
   StateReader reader(state);
   TimestampFilter stamps = stamps_;

@@ -1,10 +1,13 @@
 /// Levelling of the tracker's map by an INS.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <roadfix/ins_status_t.hpp>
 #include <roadfix/pose_t.hpp>
 #include <roadfix/state_t.hpp>
 
+#include "geometry/euler.h"
 #include "small_street.h"
+#include "vo_tracker/camera_rig.h"
 
 namespace roadfix {
 namespace {
@@ -93,6 +96,42 @@ TEST_CASE("an uncertain, missing or disabled levelling leaves the map unchanged"
   CHECK(unchanged(1.0, 0.3));
   CHECK(unchanged(0.1, 0.0));
   CHECK_FALSE(unchanged(0.1, 0.3));  // teeth
+}
+
+TEST_CASE("what an INS has learnt of its own mounting is none of the camera's tilt") {
+  constexpr double kPitch = 0.04,
+                   kRollStd = 0.035;  // rad: of the imu in the vehicle, which the camera was told against
+  const auto pitch_of_map = [](bool told) {
+    std::vector<Sent> all = with_slope(standing_first(), 0.1);
+    const Eigen::Quaterniond q_imu_vehicle = quaternion({0.0, kPitch, 0.0}).conjugate();
+    for (Sent& m : all) {
+      if (m.channel != "POSE_INS") continue;
+      auto pose = decode<pose_t>(m.bytes);
+      double* w = pose.q_wxyz;
+      const Eigen::Quaterniond q = Eigen::Quaterniond(w[0], w[1], w[2], w[3]) * q_imu_vehicle;
+      w[0] = q.w(), w[1] = q.x(), w[2] = q.y(), w[3] = q.z();
+      pose.cov_pose_m2_rad2[3][3] += kRollStd * kRollStd;
+      m.bytes = encode(pose);
+    }
+    ins_status_t status{};
+    status.mounting_rad[1] = kPitch;
+    status.mounting_std_rad[0] = kRollStd;
+    if (told) all.insert(all.begin(), sent("INS_STATUS", 20'000, 0, status));
+    return pitch(run(all, true).all<pose_t>("POSE_VO").back());
+  };
+  CHECK(pitch_of_map(true) == Approx(-kSlope).epsilon(0.05));
+  CHECK(std::abs(pitch_of_map(false)) < 0.005);  // teeth: a roll that nobody knows levels no map
+}
+
+TEST_CASE("what a calibration tells of its lens goes before the configuration") {
+  Calibration c = calibration(true);
+  KeyframeTrackerConfig config;
+  config.focal_std = 0.02;
+  CHECK(with_lens_of(c, config).focal_std == 0.02);
+  c.sensors.camera_left->focal_std = 0.001;
+  c.sensors.camera_left->radial_std = 0.003;
+  CHECK(with_lens_of(c, config).focal_std == 0.001);
+  CHECK(with_lens_of(c, config).radial_std == 0.003);
 }
 
 TEST_CASE("a state saved before levelling continues with the same bytes") {
