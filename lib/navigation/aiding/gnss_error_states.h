@@ -6,8 +6,8 @@
 
 namespace roadfix::navigation {
 
-inline constexpr double kOutage =
-    3.0;  ///< s without a receiver, after which its errors are new and compared with nothing
+/// s without a receiver, after which its errors are new and compared with nothing.
+inline constexpr double kOutage = 3.0;
 
 /// The errors of positions are zero now, with these standard deviations (m, level axes), without correlation with
 /// anything else.

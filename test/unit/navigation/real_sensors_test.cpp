@@ -83,7 +83,7 @@ TEST_CASE("velocities that come late are taken for late, and for no antenna else
   s.gnss.rate_hz = 10.0;
   int misled = 0;
   for (const double latency : {0.3, -0.3})
-    for (const uint64_t seed : {59, 60, 61}) {
+    for (const uint64_t seed : {59U, 60U, 61U}) {
       s.gnss.velocity_latency_s = latency;
       const SimulatedDrive drive = simulate(s, seed);
       NavigationConfig config = phone_config(drive);

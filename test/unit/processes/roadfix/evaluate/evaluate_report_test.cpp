@@ -42,7 +42,7 @@ TEST_CASE("a log is read back to the figures that were put in") {
     small.write_estimate(writer, "POSE_LOCAL", [](double, pose_t& m) { m.frame = pose_t::FRAME_LOCAL; });
     writer.commit();
   }
-  const EvaluationReport report = evaluate_all((folder / "out.lcm"));
+  const EvaluationReport report = evaluate_all(folder / "out.lcm");
   REQUIRE(report.channels.size() == 2);
   const auto json = report_json(report);
   const auto& ins = json["channels"]["POSE_INS"];
@@ -88,7 +88,7 @@ TEST_CASE("what is left without slow errors is said beside the figures as publis
   CHECK(ins["slow_removed"]["ate_rmse_m"].get<double>() < 0.01);
   CHECK(ins["ate_rmse_m"].get<double>() == Approx(0.25));
   CHECK(report_table(report).find("without errors slower than 20 s") != std::string::npos);
-  CHECK(!report_json(evaluate_all((folder / "out.lcm")))["channels"]["POSE_INS"].contains("slow_removed"));
+  CHECK(!report_json(evaluate_all(folder / "out.lcm"))["channels"]["POSE_INS"].contains("slow_removed"));
 }
 
 /// The page's data: what stands between `begin` and the next end of a script element.
@@ -122,9 +122,10 @@ TEST_CASE("the page has errors beside their protection levels over time, and Sta
     });
     writer.commit();
   }
-  const EvaluationReport report = evaluate_all((folder / "out.lcm"));
+  const EvaluationReport report = evaluate_all(folder / "out.lcm");
   const std::string page = report_page(report);
-  const nlohmann::json plots = page_data(page, "plots"), channel = plots["channels"][0], levels = channel["levels"];
+  const nlohmann::json plots = page_data(page, "plots");
+  const nlohmann::json &channel = plots["channels"][0], &levels = channel["levels"];
   CHECK(levels["risks"] == nlohmann::json{1e-3, 1e-5});
   CHECK(levels["alert_limit_m"] == nlohmann::json{1.4, 0.57, 1.3});
   const nlohmann::json &up = levels["axes"][2], &error = up["error_m"];
@@ -151,7 +152,7 @@ TEST_CASE("an estimate without covariance is said to have none") {
     });
     writer.commit();
   }
-  const EvaluationReport report = evaluate_all((folder / "out.lcm"));
+  const EvaluationReport report = evaluate_all(folder / "out.lcm");
   CHECK(report.channels[0].consistency.position.unusable == report.channels[0].pairs);
   CHECK(report_table(report).find("covariance: none") != std::string::npos);
 }
@@ -271,7 +272,7 @@ TEST_CASE("the order of the events in a log changes no figure, and a stray stamp
     std::vector<uint8_t> bytes;
   };
   std::vector<Event> events;
-  LogReader reader((folder / "in.lcm"));
+  LogReader reader(folder / "in.lcm");
   while (const auto event = reader.next())
     events.push_back({std::string(event->channel), {event->data.begin(), event->data.end()}});
   const auto figures = [&](const std::string& name) {
@@ -309,7 +310,7 @@ TEST_CASE("a name that is no text is shown as far as it is one") {
     small.write_drive(writer);
     writer.commit();
   }
-  EvaluationReport report = evaluate_all((folder / "out.lcm"));
+  EvaluationReport report = evaluate_all(folder / "out.lcm");
   report.facts.name = "drive \xB8";
   report.notes = {"note \xFF"};
   CHECK_THAT(report_page(report), Catch::Contains("drive "));
