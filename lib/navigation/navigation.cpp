@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "geometry/so3.h"
 #include "navigation/input_adapter.h"
 #include "navigation/motion/road_level.h"
 #include "stream/state_bytes.h"
@@ -324,6 +325,10 @@ NavigationOutput Navigation::output() {
   predict_output();
   out.imu = output_.output();
   out.odometry = output_.in_vehicle_axes(out.imu, config_.facts);
+  // Counted of the imu's pose, published of the vehicle's.
+  const Eigen::Vector2d& m = filter()->state().x.mounting;
+  const Eigen::Quaterniond q_imu_vehicle = exp_q(Eigen::Vector3d(0.0, m.x(), m.y()));
+  out.reset_delta.q = q_imu_vehicle.conjugate() * out.reset_delta.q * q_imu_vehicle;
   report().judge(out);
   out.imu.validity = out.odometry.validity;
   return out;

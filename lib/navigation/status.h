@@ -29,7 +29,7 @@ struct NavigationOutput {
   Odometry imu;        ///< the same of the imu's axes, whose relation to the vehicle's nobody knows exactly
   std::string reason;  ///< plain words, empty when all is well
   int reset_counter = 0;
-  SE3 reset_delta;  ///< of the last jump: p new minus old; q_old^-1 q_new
+  SE3 reset_delta;  ///< of the last jump of odometry: p new minus old; q_old^-1 q_new
 };
 
 /// Reads the parts of a Navigation, which must outlive it; has no state.

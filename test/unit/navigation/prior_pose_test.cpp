@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "filter_run.h"
 #include "geometry/euler.h"
@@ -120,6 +121,34 @@ TEST_CASE("a pose that somebody tells puts a car without fixes where it is, and 
     CHECK(nees < 1.5);
   }
   CHECK(nees_in_garage(city(), 3.0, 2.0) > 2.0);  // teeth: told with less than it is off by
+}
+
+TEST_CASE("the jump that is counted is that of the vehicle's pose, however the imu is mounted") {
+  ScenarioConfig standing = scenario("standing");
+  standing.duration_s = 10.0;
+  const SimulatedDrive drive = simulate(standing, 3);
+  NavigationConfig config = navtest::filter_config(standing);
+  config.facts.mounting = {0.2, -0.1};
+  Navigation filter(config);
+  PriorPose prior = told(drive, 5.0, Eigen::Vector4d::Zero());
+  prior.yaw += 1.5;  // whatever the heading of the local frame
+  std::optional<NavigationOutput> before, after;
+  const navtest::Samples samples = without_fixes(drive);
+  for (navtest::Feeder feeder(samples); !after && feeder.step(filter);) {
+    filter.clear_records();
+    const NavigationOutput o = filter.output();
+    if (o.odometry.validity == Validity::kInvalid) continue;
+    (o.local ? before : after) = o;
+    if (prior.t_us != 0 && feeder.now() >= prior.t_us) filter.add(std::exchange(prior, PriorPose()));
+  }
+  REQUIRE(after);
+  CHECK(after->reset_counter == before->reset_counter + 1);
+  const Eigen::Quaterniond jumped = before->odometry.T_frame_vehicle.q * after->reset_delta.q;
+  CHECK(jumped.angularDistance(after->odometry.T_frame_vehicle.q) < 1e-3);
+  CHECK(after->reset_delta.q.angularDistance(Eigen::Quaterniond::Identity()) > 1.0);
+  // Teeth: the jump of the imu's pose is another.
+  const Eigen::Quaterniond of_imu = before->imu.T_frame_vehicle.q.conjugate() * after->imu.T_frame_vehicle.q;
+  CHECK((before->odometry.T_frame_vehicle.q * of_imu).angularDistance(after->odometry.T_frame_vehicle.q) > 0.1);
 }
 
 TEST_CASE("a pose that somebody tells ends the search for a heading") {
