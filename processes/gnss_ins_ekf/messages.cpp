@@ -52,8 +52,13 @@ Eigen::Vector3d axis_sigmas(const Eigen::Matrix3d& turn, const Eigen::Matrix3d& 
   return (turn * P * turn.transpose()).diagonal().cwiseSqrt();
 }
 
-void fill_estimates(const navigation::Filter& filter, const navigation::VehicleFacts& vehicle,
-                    const Eigen::Quaterniond& q_vehicle_body, ins_status_t& m) {
+void fill_mounting(const Eigen::Vector2d& estimate, const Eigen::Quaterniond& q_vehicle_body, ins_status_t& m) {
+  const YawPitchRoll mounting =
+      yaw_pitch_roll(vehicle::R_imu_vehicle(estimate).transpose() * q_vehicle_body.toRotationMatrix());
+  copy(Eigen::Vector3d(mounting.roll, mounting.pitch, mounting.yaw), m.mounting_rad);
+}
+
+void fill_estimates(const navigation::Filter& filter, const Eigen::Quaterniond& q_vehicle_body, ins_status_t& m) {
   using namespace navigation;
   const Mean& x = filter.state().x;
   const Eigen::MatrixXd& P = filter.state().P();
@@ -65,10 +70,7 @@ void fill_estimates(const navigation::Filter& filter, const navigation::VehicleF
   copy(axis_sigmas(to_body, P.block<3, 3>(kAccelBias, kAccelBias)), m.accel_bias_std_mps2);
   m.wheel_scale = 1.0 / (1.0 + x.wheel_scale);
   m.wheel_scale_std = std_of(P, kWheelScale);
-  const YawPitchRoll mounting =
-      yaw_pitch_roll(vehicle::R_imu_vehicle(x.mounting).transpose() * q_vehicle_body.toRotationMatrix());
-  copy(Eigen::Vector3d(mounting.roll, mounting.pitch, mounting.yaw), m.mounting_rad);
-  m.mounting_std_rad[0] = vehicle.mounting_std.x();
+  fill_mounting(x.mounting, q_vehicle_body, m);
   m.mounting_std_rad[1] = std_of(P, kMounting);
   m.mounting_std_rad[2] = std_of(P, kMounting + 1);
   m.gnss_position_latency_s = x.position_latency;
@@ -178,7 +180,9 @@ ins_status_t ins_status(const navigation::NavigationStatus& status, const naviga
   m.gnss_reason = status.gnss_reason;
   m.wheel_scale = 1.0;
   m.wheel_scale_steps = status.wheel_scale_steps;
-  if (filter != nullptr) fill_estimates(*filter, vehicle, q_vehicle_body, m);
+  fill_mounting(vehicle.mounting, q_vehicle_body, m);  // until there is an estimate
+  copy(vehicle.mounting_std, m.mounting_std_rad);
+  if (filter != nullptr) fill_estimates(*filter, q_vehicle_body, m);
   return m;
 }
 
