@@ -244,12 +244,11 @@ void Filter::widen(const BaseVector& d) {
 }
 
 void Filter::tie_frame(const inertial::Earth& to, double yaw, double yaw_std, const Eigen::Vector3d& local_place,
-                       const Eigen::Vector3d& place) {
-  constexpr double kOpenPlace = 100.0;  // m, until the fix that tells it is used
+                       const Eigen::Vector3d& place, double place_std) {
   flush();
   const Eigen::Quaterniond turn = exp_q({0.0, 0.0, yaw});
   const Eigen::Vector3d gravity_before = earth().gravity(state_.x.nav.position);
-  state_.change_frame(yaw, place - turn * local_place, yaw_std, kOpenPlace);
+  state_.change_frame(yaw, place - turn * local_place, yaw_std, place_std);
   propagation_.change_frame(turn, to);
   // Biases held what a local frame does not know of the Earth; how much of it is what their priors left.
   const Eigen::Matrix3d to_imu = state_.x.R().transpose();

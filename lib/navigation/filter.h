@@ -44,9 +44,10 @@ class Filter {
   [[nodiscard]] ProcessModel::GnssBias& gnss_bias() { return process_.gnss_bias(); }
   [[nodiscard]] const ProcessModel::GnssBias& gnss_bias() const { return process_.gnss_bias(); }
 
-  /// A local frame becomes that of `to`, (N.7.11): turned by `yaw` about the vertical, so that local_place is `place` in it.
+  /// A local frame becomes that of `to`, (N.7.11): turned by `yaw` about the vertical, so that local_place is `place` in it,
+  /// give or take place_std (m, each axis).
   void tie_frame(const inertial::Earth& to, double yaw, double yaw_std, const Eigen::Vector3d& local_place,
-                 const Eigen::Vector3d& place);
+                 const Eigen::Vector3d& place, double place_std);
 
   /// Watches for steps from now on, (N.5.8).
   void watch_for_steps() { steps_.begin(state_, motion()); }

@@ -1,5 +1,6 @@
 #include "navigation/level_frame.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -7,6 +8,12 @@
 #include "navigation/initialisation/heading_hypotheses.h"
 
 namespace roadfix::navigation {
+
+namespace {
+
+constexpr double kOpenPlace = 100.0;  // m, at least, until what measures the place is used
+
+}  // namespace
 
 void LevelFrame::leave_local() {
   if (!local_ || !config_.sources.any_gnss()) return;
@@ -19,7 +26,7 @@ bool LevelFrame::tie(const Queued& q, Filter& filter) {
   if (!turn) return false;
   const Mean& x = filter.state().x;
   const Eigen::Vector3d antenna = x.nav.position + x.nav.q_level_imu * x.p_imu_antenna + q.ahead(x) * x.nav.velocity;
-  tie(*tie_anchor_, *turn, antenna, q.value, filter);
+  tie(*tie_anchor_, *turn, antenna, q.value, kOpenPlace, filter);
   return true;
 }
 
@@ -29,15 +36,16 @@ void LevelFrame::tie(const PriorPose& told, double ahead, Filter& filter) {
                             std::hypot(told.yaw_std, config_.facts.mounting_std.z())};
   // Fixes may wait that are expressed from there.
   const Geodetic anchor = tie_anchor_.value_or(told.place);
-  tie(anchor, turn, x.nav.position + ahead * x.nav.velocity, EnuAnchor(anchor).enu(told.place), filter);
+  tie(anchor, turn, x.nav.position + ahead * x.nav.velocity, EnuAnchor(anchor).enu(told.place),
+      std::max(kOpenPlace, std::sqrt(told.cov_enu.diagonal().maxCoeff())), filter);
 }
 
 void LevelFrame::tie(const Geodetic& anchor, const FrameTie::Turn& turn, const Eigen::Vector3d& local_place,
-                     const Eigen::Vector3d& place, Filter& filter) {
+                     const Eigen::Vector3d& place, double place_std, Filter& filter) {
   anchor_ = anchor;
   tie_anchor_.reset();
   local_ = false;
-  filter.tie_frame(earth(), turn.value, turn.std, local_place, place);
+  filter.tie_frame(earth(), turn.value, turn.std, local_place, place, place_std);
   if (config_.aiding.step_detection) filter.watch_for_steps();
 }
 

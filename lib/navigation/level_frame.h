@@ -51,7 +51,7 @@ class LevelFrame {
 
  private:
   void tie(const Geodetic& anchor, const FrameTie::Turn& turn, const Eigen::Vector3d& local_place,
-           const Eigen::Vector3d& place, Filter& filter);
+           const Eigen::Vector3d& place, double place_std, Filter& filter);
 
   NavigationConfig config_;
   FrameTie tie_;

@@ -202,6 +202,26 @@ TEST_CASE("where what was told is wrong, five fixes take the car back") {
   CHECK(after_s < 5.0 / rate + 3.0);
 }
 
+TEST_CASE("a height that nobody told is measured by the first fixes, half a kilometre higher") {
+  const SimulatedDrive drive = simulate(city(), 1);
+  navtest::Samples samples(drive);
+  const int64_t out_us = drive.imu.front().t_us + 15'000'000;
+  std::erase_if(samples.gnss, [&](const GnssFix& f) { return f.t_us < out_us; });
+  const auto after = [&](double height_std) {
+    PriorPose prior = told(drive, 3.0, Eigen::Vector4d(0.0, 0.0, -500.0, 0.0));
+    prior.cov_enu(2, 2) = height_std * height_std;
+    return drive_it(drive, samples, prior, 20.0);
+  };
+  const Outcome o = after(3000.0);
+  CHECK(o.outputs[100].imu.cov_pose(2, 2) > 500.0 * 500.0);
+  CHECK(std::abs(o.error(2)) < 1.0);
+  CHECK(o.outputs.back().reason.empty());
+  CHECK(o.outputs.back().reset_counter == 1);
+  // Teeth: told to be known, it contradicts the fixes.
+  const Outcome sure = after(5.0);
+  CHECK((!sure.outputs.back().reason.empty() || sure.outputs.back().reset_counter > 1));
+}
+
 TEST_CASE("what is no pose is refused") {
   const SimulatedDrive drive = simulate(city(), 1);
   const navtest::Samples samples = without_fixes(drive);
