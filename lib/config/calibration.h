@@ -131,10 +131,10 @@ struct Calibration {
   SensorsCalibration sensors;
   std::optional<MountingCalibration> mounting;
 
-  /// Body's axes in the vehicle's by mounting.angles_deg; none where it is not told.
+  /// Turn from body's axes to the vehicle's, mounting.angles_deg; identity where absent.
   [[nodiscard]] Eigen::Quaterniond q_vehicle_body() const;
 
-  /// The same car seen in the vehicle's axes instead of body's, as far as q_vehicle_body() knows them: places and turns of
+  /// The same car seen in the vehicle's axes instead of body's, turned by q_vehicle_body(): places and turns of
   /// antenna, axle and cameras are turned, and angles_deg is gone. Samples of the imu must be turned likewise.
   [[nodiscard]] Calibration in_vehicle_axes() const;
 

@@ -5,7 +5,7 @@
 namespace roadfix {
 namespace {
 
-constexpr double kNoLengths = 1e3;  ///< m: a sigma that says nothing of a way's length
+constexpr double kNoLengths = 1e3;  ///< m, sigma of a length that is not measured
 
 }  // namespace
 

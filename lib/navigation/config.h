@@ -37,8 +37,9 @@ struct VehicleFacts {
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero(), p_imu_axle_std = Eigen::Vector3d::Zero();        ///< m
   std::optional<CameraFacts> camera;
 
-  /// False of a rig that is no part of a car: nobody knows which way is ahead.
-  [[nodiscard]] bool mounting_known() const { return mounting_std.tail<2>().maxCoeff() <= 0.5; }
+  /// False of a rig that is no part of a car, whose forward direction is unknown.
+  [[nodiscard]] bool mounting_known() const { return mounting_std.tail<2>().maxCoeff() <= kMountingKnown; }
+  static constexpr double kMountingKnown = 0.5;  ///< rad
 
   /// One for each axis whose angular rate is measured.
   [[nodiscard]] Eigen::Vector3d measured_rates() const {

@@ -34,8 +34,8 @@ class LevelFrame {
   void leave_local();
   /// A measurement of a receiver in a local frame; true: the filter's state is in enu from now on.
   bool tie(const Queued& q, Filter& filter);
-  /// What somebody told of place and heading does it at once; `ahead`: s from the filter's epoch to that moment. The state
-  /// has the heading with that, and is open about the place yet.
+  /// A prior pose does it at once; `ahead`: s from the filter's epoch to its stamp. The state has its heading then, and an
+  /// open place.
   void tie(const PriorPose& told, double ahead, Filter& filter);
   /// Time has passed unmeasured: the way so far ties nothing.
   void restart_tie() { tie_.restart(); }

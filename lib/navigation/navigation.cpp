@@ -128,7 +128,7 @@ void Navigation::use_prior_pose() {
     if (!ahead) return prior.drop(log_);
     frame_.tie(prior.told(), *ahead, *filter_);
     start_.see_tie(filter_->state().x, motion_.last_us());
-    prior.use_place(*filter_, place(), log_);
+    prior.use_place(*filter_, place(), *ahead, log_);
   }
   resets_.count(before, filter_->state().x);
   output_.clear();

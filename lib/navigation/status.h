@@ -26,7 +26,7 @@ struct NavigationOutput {
   Phase phase = Phase::kWaiting;
   bool local = false;  ///< the level frame is where it started, until fixes tie it; else enu
   Odometry odometry;   ///< of the vehicle's axes, origin at the imu, in the level frame
-  Odometry imu;        ///< the same of the imu's axes, whose relation to the vehicle's nobody knows exactly
+  Odometry imu;        ///< the same of the imu's axes
   std::string reason;  ///< plain words, empty when all is well
   int reset_counter = 0;
   SE3 reset_delta;  ///< of the last jump of odometry: p new minus old; q_old^-1 q_new

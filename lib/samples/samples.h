@@ -31,7 +31,7 @@ struct GnssVelocity {
   Eigen::Matrix3d cov_enu = Eigen::Matrix3d::Zero();  ///< m2/s2
 };
 
-/// Where somebody says that the vehicle is: a person, a map of parking places, a fleet's memory.
+/// A prior pose from outside the car: of a person, a map of parking places, a fleet's memory.
 struct PriorPose {
   int64_t t_us = 0;
   Geodetic place;                                     ///< of the imu

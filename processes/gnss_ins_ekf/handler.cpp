@@ -168,7 +168,7 @@ class GnssInsStage final : public Stage {
 
   GnssInsProcessConfig config_;
   std::string calibration_;
-  Eigen::Quaterniond q_vehicle_body_;  ///< as far as the calibration knows it
+  Eigen::Quaterniond q_vehicle_body_;  ///< of the calibration
   navigation::NavigationConfig filter_config_;
   StageSpec spec_;
   std::optional<navigation::Navigation> filter_;

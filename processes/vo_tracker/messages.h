@@ -31,13 +31,13 @@ Restart restart(const vo_restart_t& message);
 /// Vehicle speed; no value where the sample has none.
 std::optional<SpeedSample> wheel_speed(const WheelSample& sample, const std::optional<WheelsCalibration>& wheels);
 std::optional<SpeedSample> ins_speed(const Odometry& odometry);
-/// How the imu sits in the vehicle, to whose axes a calibration's cameras are turned by what it tells of that.
+/// The mounting that an INS has estimated, beyond the calibration's angles, by which cameras are turned already.
 struct InsMounting {
-  Eigen::Quaterniond learnt = Eigen::Quaterniond::Identity();  ///< of the axes told to those that the INS has found
-  double roll_std = 0.0;                                       ///< rad, which no INS finds
+  Eigen::Quaterniond learnt = Eigen::Quaterniond::Identity();  ///< calibrated to estimated axes
+  double roll_std = 0.0;                                       ///< rad, of the calibration: roll is not estimated
 };
 InsMounting ins_mounting(const ins_status_t& status, const Calibration& calibration);
-/// Attitude of the axes that the cameras' places are told in.
+/// Attitude of the axes that cameras are calibrated in.
 std::optional<AttitudeSample> ins_level(const Odometry& odometry, const InsMounting& mounting);
 
 }  // namespace roadfix

@@ -155,7 +155,7 @@ class WheelOdometryStage final : public Stage {
 
   WheelOdometryConfig config_;
   std::string calibration_;
-  Eigen::Quaterniond q_vehicle_body_;  ///< as far as the calibration knows it
+  Eigen::Quaterniond q_vehicle_body_;  ///< of the calibration
   bool on_rear_axle_;
   PublishSlot slot_;
   StageSpec spec_;

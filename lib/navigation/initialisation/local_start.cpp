@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kEvery = 0.1;          // s between two attempts
 constexpr double kRestSpeed = 0.02;     // m/s, of wheels that stand
-constexpr double kRestVelocity = 0.02;  // m/s, sigma of a start where wheels say that it stands
-constexpr int kCalmBlocks = 4;          // in a row, where neither says anything
+constexpr double kRestVelocity = 0.02;  // m/s, sigma of a start where wheels measure no speed
+constexpr int kCalmBlocks = 4;          // in a row, where neither wheels nor pictures are there
 constexpr double kLocalYaw = 1e-4;      // rad: the heading at the start is a convention
 
 StartState local_start(const LocalContext& c) {

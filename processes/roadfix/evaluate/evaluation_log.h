@@ -59,7 +59,7 @@ const PoseStream& poses_of(const EvaluationLog& log, const std::string& channel,
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor);
 
 /// Poses of the vehicle's axes turned into the imu's, those of references and calibrations. The navigation filter has
-/// learnt how they lie (POSE_FUSED repeats it); the others have what the calibration tells.
+/// estimated the turn between them (POSE_FUSED repeats it); the others have the calibration's.
 void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const Calibration& calibration,
                       PoseStream& stream);
 

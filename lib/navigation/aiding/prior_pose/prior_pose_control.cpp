@@ -9,7 +9,7 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kOvertaken = 1.0;  // s: what is told of a car that drives is out of date then
+constexpr double kOvertaken = 1.0;  // s: of a car that drives a prior pose is out of date then
 
 bool sane(const PriorPose& p) {
   const bool finite = std::isfinite(p.place.latitude) && std::isfinite(p.place.longitude) &&
@@ -49,10 +49,9 @@ bool PriorPoseControl::use(Filter& filter, const Eigen::Vector3d& place, AidingL
   return true;
 }
 
-void PriorPoseControl::use_place(Filter& filter, const Eigen::Vector3d& place, AidingLog& log) {
-  const double moved = ahead(filter.state().x).value_or(0.0);
+void PriorPoseControl::use_place(Filter& filter, const Eigen::Vector3d& place, double ahead, AidingLog& log) {
   const Told t = take();
-  const Measurement<3> at = prior_place(filter.state(), place, t.pose.cov_enu, moved);
+  const Measurement<3> at = prior_place(filter.state(), place, t.pose.cov_enu, ahead);
   log.add(filter.fuse(AidingSource::kPriorPose, t.pose.t_us, at, Gates::open().nis[3]), t.id);
 }
 

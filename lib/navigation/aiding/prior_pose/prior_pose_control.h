@@ -1,4 +1,4 @@
-/// A place and a heading that somebody tells: kept until there is a state, then used as a whole or not at all.
+/// A prior pose from outside: kept until there is a state, then used as a whole or rejected as a whole.
 #pragma once
 
 #include <optional>
@@ -21,13 +21,13 @@ class PriorPoseControl {
   [[nodiscard]] bool waits() const { return told_.has_value(); }
   [[nodiscard]] const PriorPose& told() const { return told_->pose; }
 
-  /// s from the state's epoch to the moment that is told of; zero of a car that stands. Nothing where it has driven since.
+  /// s from the state's epoch to the prior's stamp; zero of a car that stands. Nothing where it has driven since.
   [[nodiscard]] std::optional<double> ahead(const Mean& x) const;
 
   /// On a filter that runs in enu, `place` there; both must pass the gate. True: used.
   bool use(Filter& filter, const Eigen::Vector3d& place, AidingLog& log);
-  /// On a filter whose frame has just got its heading from what is told.
-  void use_place(Filter& filter, const Eigen::Vector3d& place, AidingLog& log);
+  /// On a filter whose frame has just got its heading from it; `ahead`: as above, of the filter before.
+  void use_place(Filter& filter, const Eigen::Vector3d& place, double ahead, AidingLog& log);
   /// On headings that are tried side by side.
   void try_on(HeadingHypotheses& all, const Eigen::Vector3d& place, AidingLog& log);
   /// There is nothing that it could be compared with.

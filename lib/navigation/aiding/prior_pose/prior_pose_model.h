@@ -1,4 +1,4 @@
-/// Where somebody says that the car stands, (N.4.16) and (N.4.17) of MODEL.md.
+/// A prior pose from outside as a measurement, (N.4.16) and (N.4.17) of MODEL.md.
 #pragma once
 
 #include "navigation/filter.h"
@@ -6,7 +6,7 @@
 
 namespace roadfix::navigation {
 
-/// `place`: of the imu, level frame; `ahead`: s from the state's epoch to the moment that is told of.
+/// `place`: of the imu, level frame; `ahead`: s from the state's epoch to the prior's stamp.
 Measurement<3> prior_place(const State& state, const Eigen::Vector3d& place, const Eigen::Matrix3d& cov, double ahead);
 
 /// Of the vehicle's x axis; rad, counterclockwise from the level frame's x.
