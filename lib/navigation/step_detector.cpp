@@ -29,6 +29,7 @@ struct Block {
 constexpr int kBiases = 1, kDisplacement = 7, kDrag = 10, kImuClock = 13, kReceiverClock = 14,
               kWheelClock = 15;                      // columns
 constexpr int kAntennaPlace = StepDetector::kWidth;  // the columns of the start stand behind those of a moment here
+constexpr int kTakenBack = kAntennaPlace + StepDetector::kAntennaSize;  // and then what was taken back
 constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
                                 Block{StepKind::kImu, kBiases, 6, 7.0, true},
                                 Block{StepKind::kReceiver, kDisplacement, 6, 0.0, true},
@@ -36,9 +37,13 @@ constexpr std::array kBlocks = {Block{StepKind::kWheels, 0, 1, 2.0},
                                 Block{StepKind::kImuClock, kImuClock, 1, 2.0},
                                 Block{StepKind::kReceiverClock, kReceiverClock, 1, 2.0, true},
                                 Block{StepKind::kWheelClock, kWheelClock, 1, 2.0},
-                                Block{StepKind::kLeverArm, kAntennaPlace, StepDetector::kAntennaSize, 3.0}};
+                                Block{StepKind::kLeverArm, kAntennaPlace, StepDetector::kAntennaSize, 3.0},
+                                Block{StepKind::kNone, kTakenBack, 1, kBeyondOthers}};  // it was likelier by as much
 constexpr bool of_receiver(StepKind kind) { return kind == StepKind::kReceiver || kind == StepKind::kReceiverClock; }
-constexpr int column_of(int at) { return at < StepDetector::kWidth ? at : at - StepDetector::kWidth; }
+constexpr int column_of(int at) {
+  if (at == kTakenBack) return 0;
+  return at < kAntennaPlace ? at : at - kAntennaPlace;
+}
 
 /// A step given the evidence: mean, covariance, and the logarithm of the Bayes factor. Its prior is normal where it is not
 /// larger than steps are; where it is, they are larger than was assumed, which the odds pay for.
@@ -82,12 +87,12 @@ StepDetector::StepDetector(const VehicleFacts& v) {
   constexpr double kScale = 0.02, kArm = 0.5, kReceiver = 5.0, kRate = 0.5, kClock = 0.05;  // 1, m, m, m/s, s
   typical_ << kScale, Eigen::Vector3d::Constant(v.gyro_bias_std), Eigen::Vector3d::Constant(v.accel_bias_std),
       Eigen::Vector3d::Constant(kReceiver), Eigen::Vector3d::Constant(kRate), v.has_imu ? kClock : 0.0, kClock, kClock,
-      Eigen::Vector3d::Constant(kArm);
+      Eigen::Vector3d::Constant(kArm), 1.0;
 }
 
 void StepDetector::begin(State& state, const BodyMotion& motion) {
   if (state.carried().cols() != kColumns) state.carry(kColumns);
-  for (int m = kMoments; m >= 0; --m) begin(state, motion, m);  // of the start first, which the others note
+  for (int m = kTaken; m >= 0; --m) begin(state, motion, m);  // of the start before the others, which note it
   next_us_ = 0;
   usual_ = 1.0;
   fresh_ = false;
@@ -97,6 +102,7 @@ void StepDetector::begin(State& state, const BodyMotion& motion) {
 /// An imu's clock that is set forward by d leaves a gap of d in its stamps, over which the state is moved once too often, and
 /// one that is set back leaves out as much, (N.5.9).
 void StepDetector::begin_columns(State& state, const BodyMotion& motion, int moment) const {
+  if (moment == kTaken) return;  // what was taken back stays it
   auto columns = state.carried().middleCols(first(moment), width(moment));
   columns.setZero();
   if (moment == kStart) {  // positions were taken from that antenna, and so are the estimate's
@@ -123,6 +129,7 @@ void StepDetector::begin(State& state, const BodyMotion& motion, int moment) {
   information_[static_cast<size_t>(moment)].setZero();
   sum_.col(moment).setZero();
   age_(moment) = squares_(moment) = count_(moment) = 0.0;
+  if (moment == kTaken && last_us_ != 0) age_(moment) = seconds_between(last_us_, state.x.t_us);
   if (moment < kStart)
     before_[static_cast<size_t>(moment)] = {information_[kStart].topLeftCorner<kAntennaSize, kAntennaSize>(),
                                             sum_.col(kStart).head<kAntennaSize>(), squares_(kStart), count_(kStart)};
@@ -208,7 +215,8 @@ void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen
   // Robust weight, as of Huber's estimator: single outliers decide nothing, those that agree with each other do.
   const double square = whitened.squaredNorm(), rows = static_cast<double>(whitened.size());
   const double weight = std::min(1.0, kChance * kChance * rows / square);
-  for (int m = 0; m <= (antenna && !displaced_ ? kStart : kStart - 1); ++m) {
+  for (int m = 0; m <= kTaken; ++m) {
+    if (m == kStart && (!antenna || displaced_)) continue;
     const int n = width(m);
     const auto g = G.middleCols(first(m), n);
     information_[static_cast<size_t>(m)].topLeftCorner(n, n) += weight * g.transpose().lazyProduct(g);
@@ -219,8 +227,11 @@ void StepDetector::weigh(const Eigen::Ref<const Eigen::MatrixXd>& G, const Eigen
   fresh_ = true;
 }
 
+bool StepDetector::doubts_last() const { return last_us_ != 0 && age_(kTaken) < kMemory; }
+
 bool StepDetector::carries(int moment, int at, int size) const {
-  return at < kWidth ? moment < kStart && at + size <= width(moment) : moment == kStart;
+  if (at >= kWidth) return moment == (at == kTakenBack ? kTaken : kStart);
+  return moment < kStart && at + size <= width(moment);
 }
 
 StepDetector::Fit StepDetector::best_of(size_t block) const {
@@ -228,8 +239,8 @@ StepDetector::Fit StepDetector::best_of(size_t block) const {
   const double usual = std::max(1.0, usual_);
   const int column = column_of(b.first);
   Fit best;
-  for (int m = 0; m <= kMoments; ++m) {
-    if (count_(m) < kLeastEvidence || !carries(m, b.first, b.size)) continue;
+  for (int m = 0; m <= kTaken; ++m) {
+    if (count_(m) < kLeastEvidence || !carries(m, b.first, b.size) || (m == kTaken && !doubts_last())) continue;
     const Posterior p(information_[static_cast<size_t>(m)].block(column, column, b.size, b.size) / usual,
                       sum_.col(m).segment(column, b.size) / usual, typical_.segment(b.first, b.size), b.any_size);
     if (p.explained * usual < kMostOfIt * squares_(m) || p.log_odds <= best.likelihood) continue;
@@ -271,16 +282,16 @@ void StepDetector::take_back(const Step& step, State& state, const BodyMotion& m
     d = per_unit * root.col(k);
     widen();
   }
-  auto last = state.carried().col(kLast);
-  const bool lately = last_us_ != 0 && seconds_between(last_us_, state.x.t_us) < kMemory;
-  if (lately && last_kind_ != step.kind) {
+  auto last = state.carried().col(first(kTaken));
+  if (doubts_last() && last_kind_ != step.kind && step.kind != StepKind::kNone) {
     d = last.head(n);
     widen();
   }
-  if (!lately || last_kind_ != step.kind) last.setZero();
+  if (!doubts_last() || last_kind_ != step.kind) last.setZero();
   last.head(n) += made;
   last_kind_ = step.kind;
-  last_us_ = step.kind == StepKind::kReceiver || step.kind == StepKind::kLeverArm ? 0 : state.x.t_us;
+  const bool watched = step.kind == StepKind::kReceiver || step.kind == StepKind::kLeverArm;
+  last_us_ = watched || step.kind == StepKind::kNone ? 0 : state.x.t_us;
   if (step.kind == StepKind::kLeverArm) return begin(state, motion);
   begin_after(state, motion, step.age);
 }

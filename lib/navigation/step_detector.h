@@ -25,6 +25,7 @@ enum class StepKind {
   kReceiverClock,
   kWheelClock,
   kLeverArm,  ///< no step: the antenna has never been where the calibration says
+  kNone,      ///< what was taken back last had not stepped
 };
 
 class StepDetector {
@@ -39,13 +40,18 @@ class StepDetector {
   /// The moment from which on the filter watches: the antenna's place, which was wrong from the start if it is.
   static constexpr int kStart = kMoments;
   static constexpr int kAntennaSize = 3;
+  /// The moment at which a step was taken back last.
+  static constexpr int kTaken = kStart + 1;
   /// Columns of a moment: wheel scale, gyro and accelerometer biases, displacement, its rate, three clocks.
   static constexpr int kWidth = 16;
   static constexpr int kColumns = kRecent * kWidth + kMoments - kRecent + kAntennaSize + 1;
-  static constexpr int kLast = kColumns - 1;  ///< what the step made that was taken back last
-  static constexpr int width(int moment) { return moment < kRecent ? kWidth : moment < kStart ? 1 : kAntennaSize; }
+  static constexpr int width(int moment) {
+    if (moment < kRecent) return kWidth;
+    return moment == kStart ? kAntennaSize : 1;
+  }
   static constexpr int first(int moment) {
-    return moment < kRecent ? moment * kWidth : kRecent * kWidth + moment - kRecent;
+    if (moment < kRecent) return moment * kWidth;
+    return moment < kTaken ? kRecent * kWidth + moment - kRecent : kColumns - 1;
   }
   using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
   using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
@@ -116,7 +122,7 @@ class StepDetector {
   void serialise(Archive& a) {
     a(watches_, fresh_, displaced_, next_us_, turn_, latest_, surprised_us_, surprise_, usual_, age_, sum_, squares_,
       count_, last_kind_, last_us_);
-    for (int m = 0; m <= kMoments; ++m) serialise(a, information_[static_cast<size_t>(m)], width(m));
+    for (int m = 0; m <= kTaken; ++m) serialise(a, information_[static_cast<size_t>(m)], width(m));
     for (OfAntenna& b : before_) a(b.information, b.sum, b.squares, b.count);
   }
 
@@ -148,9 +154,12 @@ class StepDetector {
   };
   [[nodiscard]] Fit best_of(size_t block) const;
   [[nodiscard]] bool carries(int moment, int at, int size) const;
+  /// A step was taken back lately, and another may have been the cause.
+  [[nodiscard]] bool doubts_last() const;
 
-  /// Standard deviations of steps, in the order of a moment's columns; then those of the antenna's place.
-  Eigen::Matrix<double, kWidth + kAntennaSize, 1> typical_;
+  /// Standard deviations of steps, in the order of a moment's columns; then those of the antenna's place, and the share of
+  /// what was taken back.
+  Eigen::Matrix<double, kWidth + kAntennaSize + 1, 1> typical_;
   Eigen::MatrixXd explained_ = Eigen::MatrixXd::Zero(3, kColumns), moved_ = Eigen::MatrixXd::Zero(9, kColumns);
   bool watches_ = false, fresh_ = false;
   bool displaced_ = false;  ///< the receiver is known to be
@@ -161,14 +170,14 @@ class StepDetector {
   StepKind last_kind_ = StepKind::kWheels;  ///< of what was taken back last
   int64_t last_us_ = 0;                     ///< when; 0: nothing, or nothing to doubt
   double usual_ = 1.0;                      ///< mean normalised square: measurements may be noisier than they claim
-  std::array<Square, kMoments + 1> information_ = [] {
-    std::array<Square, kMoments + 1> zero;
+  std::array<Square, kTaken + 1> information_ = [] {
+    std::array<Square, kTaken + 1> zero;
     zero.fill(Square::Zero());
     return zero;
   }();
-  Eigen::Matrix<double, kWidth, kMoments + 1> sum_ = Eigen::Matrix<double, kWidth, kMoments + 1>::Zero();
+  Eigen::Matrix<double, kWidth, kTaken + 1> sum_ = Eigen::Matrix<double, kWidth, kTaken + 1>::Zero();
   /// By moment: s since; of the innovations beyond their number; evidence.
-  using ByMoment = Eigen::Matrix<double, kMoments + 1, 1>;
+  using ByMoment = Eigen::Matrix<double, kTaken + 1, 1>;
   ByMoment age_ = ByMoment::Zero(), squares_ = ByMoment::Zero(), count_ = ByMoment::Zero();
   std::array<OfAntenna, kMoments> before_;  ///< as it was when the moment began
 };
