@@ -59,7 +59,7 @@ void Failover::add(FusionChannel c, bool fresh, const Channels& channels, const 
     return;
   }
   if (implausible(ins.correction(), ins.covariance_before())) return stop("POSE_INS corrected itself without a fix");
-  enu_ = enu_ || ins.enu();
+  enu_ = enu_ || ins.newest().enu;
   start_at(pose_, ins);
 }
 
@@ -86,8 +86,8 @@ void Failover::stop(const char* why) {
 /// enough: after a contradiction longer than after a mere silence.
 bool Failover::readmits(const PoseChannel& ins, const Channels& channels, const LocalMotion& local,
                         int64_t t_us) const {
-  if (!ever_ || (ins.enu() && !enu_)) return true;
-  if (ins.enu() != enu_) return false;
+  if (!ever_ || (ins.newest().enu && !enu_)) return true;
+  if (ins.newest().enu != enu_) return false;
   const double healthy = seconds_between(*good_since_us_, t_us);
   if (healthy < config_.readmission) return false;
   const double aided = std::min(healthy, gnss_for(t_us));
@@ -103,7 +103,7 @@ bool Failover::readmits(const PoseChannel& ins, const Channels& channels, const 
 void Failover::take_over(const PoseChannel& ins) {
   follows_ = ever_ = true;
   contradicted_ = false;
-  enu_ = ins.enu();
+  enu_ = ins.newest().enu;
   why_.clear();
   start_at(pose_, ins);
   trusted_ = {pose_, pose_};

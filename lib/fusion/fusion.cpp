@@ -82,8 +82,8 @@ Epoch Fusion::epoch_at(int64_t at_us) const {
     Witness& w = e.channels[static_cast<std::size_t>(c)];
     w.comparable = channel.moves(t_us_);
     if (!w.comparable) continue;
-    w.segment = channel.segment();
-    w.track = channel.track(at_us);
+    w.segment = channel.track().segment();
+    w.track = channel.way(at_us);
     if (c != FusionChannel::kIns) continue;
     w.track = channel.pose(at_us);
     w.P = channel.view().P;
@@ -103,7 +103,7 @@ void Fusion::judge() {
     const auto& c = witnesses_.comparison(a, b);
     return c.done && c.fits && !contradict(a, b);
   };
-  const bool witnesses_count = !channel(kVo).on_trial() && !channel(kWheel).on_trial();
+  const bool witnesses_count = !channel(kVo).health().on_trial() && !channel(kWheel).health().on_trial();
   const bool agree = witnesses_.agreement(kVo, kWheel) == WitnessAgreement::kAgree;
   // Fixes that are back after an outage may correct it by more than it claims, and be displaced themselves for a while.
   const double returned = failover_.gnss_for(t_us_);
@@ -117,9 +117,9 @@ void Fusion::judge() {
   };
   const bool vo_fits = fits(kIns, kVo) || fits(kVo, kWheel) || alone(kVo);
   const bool wheel_fits = fits(kIns, kWheel) || fits(kVo, kWheel) || alone(kWheel);
-  at(kIns).judge(ins_bad, true);
-  at(kVo).judge(vo_bad, vo_fits);
-  at(kWheel).judge(wheel_bad, wheel_fits);
+  at(kIns).health().judge(ins_bad, true);
+  at(kVo).health().judge(vo_bad, vo_fits);
+  at(kWheel).health().judge(wheel_bad, wheel_fits);
   failover_.judge(ins_bad, !contradict(kIns, kVo) && !contradict(kIns, kWheel), channels_, t_us_);
 }
 
@@ -170,7 +170,7 @@ void Fusion::adapt(FusionChannel c, FusionChannel reference) {
   const auto other = witnesses_.window(reference, Witnesses::kShort, channels_);
   const auto own = witnesses_.window(c, Witnesses::kShort, channels_);
   if (!other || !own || witnesses_.agreement(reference, c) != WitnessAgreement::kAgree) return;
-  at(c).adapt(difference_of(other->motion, own->motion), own->motion, own->dt, other->S + own->S - own->Q);
+  at(c).errors().adapt(difference_of(other->motion, own->motion), own->motion, own->dt, other->S + own->S - own->Q);
 }
 
 /// A pose that is repeated although its own velocity, or another channel, says that the vehicle moves.
@@ -181,7 +181,7 @@ void Fusion::watch_frozen() {
     bool moves = own.odometry().velocity.norm() > kMoves;
     for (const FusionChannel other : kAll)
       moves = moves || (other != c && channel(other).good(t_us_) && std::abs(channel(other).speed()) > kMoves);
-    own.set_frozen(moves && own.repeated(t_us_) > kRepeated);
+    own.health().set_frozen(moves && own.repeated(t_us_) > kRepeated);
   }
 }
 

@@ -5,7 +5,7 @@
 namespace roadfix {
 namespace {
 
-constexpr double kTurn = 0.05;  ///< rad
+constexpr double kAnnouncedTurn = 0.05;  ///< rad
 
 }  // namespace
 
@@ -15,7 +15,7 @@ void JumpCount::add(const Odometry& fused, const Odometry& local, bool enu, doub
   if (started_) {
     const Planar jump = difference_of(now, after_motion(fused_, motion_between(local_, local_now)));
     const double rise = height - height_ - (local_height - local_height_);
-    if (enu != enu_ || std::hypot(jump.head<2>().norm(), rise) > least || std::abs(jump.z()) > kTurn) {
+    if (enu != enu_ || std::hypot(jump.head<2>().norm(), rise) > least || std::abs(jump.z()) > kAnnouncedTurn) {
       ++count_;
       last_ = jump;
       last_height_ = rise;

@@ -95,7 +95,7 @@ MotionStep LocalMotion::motion(const Channels& channels, int64_t from_us, int64_
   if (dt == 0.0) return {};
   if (velocity_ && channels[index_of(*velocity_)].last_us()) {
     const PoseChannel& channel = channels[index_of(*velocity_)];
-    if (channel.has_track(from_us) && from_us < channel.t_us()) {
+    if (channel.track().has(from_us) && from_us < channel.t_us()) {
       const int64_t known_us = std::min(to_us, channel.t_us());
       MotionStep sum;
       sum.add(channel.measured(from_us, known_us));

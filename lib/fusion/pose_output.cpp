@@ -37,7 +37,7 @@ Ahead ahead_of(const FusionNow& now, const NewestSample& n) {
   a.enu = n.sample->enu;
   a.dt = seconds_between(now.t_us, a.newest->t_us);
   const PoseChannel& clock = now.channel(a.channel);
-  a.joined = clock.alive(now.t_us) && clock.reset_counter() == n.sample->reset_counter &&
+  a.joined = clock.alive(now.t_us) && clock.newest().reset_counter == n.sample->reset_counter &&
              (!n.invalid_us || *n.invalid_us <= clock.t_us()) &&
              seconds_between(clock.t_us(), a.newest->t_us) < kLongestGap;
   if (!a.joined) return a;

@@ -65,7 +65,7 @@ std::optional<WindowMotion> Witnesses::window(FusionChannel c, int epochs, const
   const MotionStep step = channels[i].calibration().corrected(measured, m.dt);
   m.motion = step.motion;
   m.by_calibration = step.by_calibration;
-  m.Q = channels[i].window_noise(step.motion, m.dt);
+  m.Q = channels[i].errors().of_window(step.motion, m.dt);
   m.S = m.covariance(channels[i].calibration().covariance());
   return m;
 }
@@ -83,7 +83,7 @@ void Witnesses::compare(Pair& pair, FusionChannel a, FusionChannel b, const Chan
     }
     const Planar d = difference_of(of_b->motion, of_a->motion);
     Eigen::Matrix3d S = of_a->S + of_b->S;
-    if (a == FusionChannel::kIns && channels[static_cast<std::size_t>(b)].lengths_of_wheels()) {
+    if (a == FusionChannel::kIns && channels[static_cast<std::size_t>(b)].newest().lengths_of_wheels) {
       // Vision has its lengths from the wheels: it is no second witness of the way's length.
       const Eigen::Vector2d borrowed = kBorrowedLengths * of_b->motion.head<2>();
       S.topLeftCorner<2, 2>() += borrowed * borrowed.transpose();

@@ -50,7 +50,7 @@ class ImmFusionStage final : public Stage {
         pose_slot_(config.publish_period),
         state_slot_(config.state_period) {
     spec_.name = "imm_fusion";
-    spec_.state_layout = 10;
+    spec_.state_layout = 11;
     // Vision counts when it is 150 ms old, so that the others need not wait for it.
     spec_.inputs = {{"INS_STATUS", "ins_status_t", 50'000, 0},
                     {"POSE_INS", "pose_t", 0, 0},

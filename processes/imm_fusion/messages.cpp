@@ -103,8 +103,8 @@ void fill_channels(const Fusion& fusion, fusion_state2_t& m) {
     m.channel_status.push_back(status_code(report.status));
     m.channel_health.push_back(health_code(channel.state(fusion.t_us())));
     m.channel_weight.push_back(report.weight);
-    m.channel_alpha.push_back(channel.noise_factors().x());
-    m.channel_yaw_alpha.push_back(channel.noise_factors().y());
+    m.channel_alpha.push_back(channel.errors().factors().x());
+    m.channel_yaw_alpha.push_back(channel.errors().factors().y());
     m.channel_nis.push_back(report.nis);
     m.channel_gate.push_back(fusion.config().agreement.gate);
     m.channel_age_s.push_back(channel.last_us() ? seconds_between(*channel.last_us(), fusion.t_us()) : kNeverAge);
