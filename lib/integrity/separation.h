@@ -34,6 +34,15 @@ struct Anchor {
     a(s.t_us, s.p, s.yaw, s.cov, s.yaw_variance, s.witness, s.witness_yaw, s.witness_track, s.own, s.way, s.forward,
       s.bend);
   }
+  /// `Optional`: std::optional<Anchor> or a const one.
+  template <class Optional, class Archive>
+  static void archive_optional(Optional& anchor, Archive& a) {
+    Anchor value = anchor.value_or(Anchor{});
+    bool known = anchor.has_value();
+    a(known);
+    archive(value, a);
+    if constexpr (Archive::kReads) anchor = known ? Optional(value) : Optional();
+  }
 };
 
 /// Axes along, across, up of the vehicle now.

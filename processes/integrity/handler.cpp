@@ -115,6 +115,7 @@ class IntegrityStage final : public Stage {
                     {"POSE_INS", "pose_t", 0, 0},
                     {"POSE_FUSED", "pose_t", 100'000, 0}};
     spec_.clocks = {{kIns, 300'000}, {kFused, 600'000}};
+    spec_.state_layout = 2;
     spec_.outputs = {{"PROTECTION_INS", "protection_level_t"}, {"PROTECTION_FUSED", "protection_level_t"}};
   }
 
