@@ -22,6 +22,7 @@ void retract_base(Mean& x, const Eigen::Ref<const Eigen::VectorXd>& d, const Eig
   x.accel_scale += part(d, kAccelScale);
   x.wheel_scale += d(kWheelScale);
   x.mounting += d.segment<2>(kMounting);
+  x.rear_slip += d(kRearSlip);
   x.p_imu_axle += part(d, kAxle);
   x.p_imu_antenna += part(d, kAntenna);
   x.position_latency += d(kPositionLatency);
@@ -69,6 +70,7 @@ BaseVector local(const Mean& x, const Mean& y, const Eigen::Vector3d& p_ref) {
   d.segment<3>(kAccelScale) = y.accel_scale - x.accel_scale;
   d(kWheelScale) = y.wheel_scale - x.wheel_scale;
   d.segment<2>(kMounting) = y.mounting - x.mounting;
+  d(kRearSlip) = y.rear_slip - x.rear_slip;
   d.segment<3>(kAxle) = y.p_imu_axle - x.p_imu_axle;
   d.segment<3>(kAntenna) = y.p_imu_antenna - x.p_imu_antenna;
   d(kPositionLatency) = y.position_latency - x.position_latency;

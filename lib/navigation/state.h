@@ -31,22 +31,23 @@ inline constexpr int kWheelScale = 21;        ///< measured speed over true spee
 inline constexpr int kMounting = 22;          ///< rad, pitch and yaw of the vehicle's axes in the imu's
 inline constexpr int kAxle = 24;              ///< m, imu axes: the point that does not slip
 inline constexpr int kAntenna = 27;           ///< m, imu axes: phase centre
-inline constexpr int kPositionLatency = 30;   ///< s, age of a GNSS position at its stamp
-inline constexpr int kVelocityLatency = 31;   ///< s, age of a GNSS velocity at its stamp
-inline constexpr int kImuOffset = 32;         ///< s, imu stamp minus true time
-inline constexpr int kWheelLatency = 33;      ///< s, age of a wheel speed at its stamp
-inline constexpr int kGnssBias = 34;          ///< m, Gauss-Markov error of GNSS positions, level axes
-inline constexpr int kGnssVelocityBias = 37;  ///< m/s, likewise of GNSS velocities
-inline constexpr int kGnssReturn = 40;        ///< m, what a receiver brought back from an outage, level axes
-inline constexpr int kReturnRate = 43;        ///< of the logarithm of its rate
-inline constexpr int kWithoutCamera = 44;
-inline constexpr int kCameraTurn = 44;    ///< rad, of the left camera in the imu, camera axes
-inline constexpr int kCameraPlace = 47;   ///< m, imu axes
-inline constexpr int kLens = 50;          ///< of the left camera, (N.6.9)
-inline constexpr int kRightTurn = 53;     ///< rad, of the right camera against the left one, right camera's axes
-inline constexpr int kTrackDrift = 56;    ///< rad/m, camera axes: a slow turn that all tracks pretend, (N.6.20)
-inline constexpr int kCameraOffset = 59;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
-inline constexpr int kBaseSize = 60;
+inline constexpr int kRearSlip = 30;          ///< rad per m/s2: slip angle of the rear tyres by lateral acceleration
+inline constexpr int kPositionLatency = 31;   ///< s, age of a GNSS position at its stamp
+inline constexpr int kVelocityLatency = 32;   ///< s, age of a GNSS velocity at its stamp
+inline constexpr int kImuOffset = 33;         ///< s, imu stamp minus true time
+inline constexpr int kWheelLatency = 34;      ///< s, age of a wheel speed at its stamp
+inline constexpr int kGnssBias = 35;          ///< m, Gauss-Markov error of GNSS positions, level axes
+inline constexpr int kGnssVelocityBias = 38;  ///< m/s, likewise of GNSS velocities
+inline constexpr int kGnssReturn = 41;        ///< m, what a receiver brought back from an outage, level axes
+inline constexpr int kReturnRate = 44;        ///< of the logarithm of its rate
+inline constexpr int kWithoutCamera = 45;
+inline constexpr int kCameraTurn = 45;    ///< rad, of the left camera in the imu, camera axes
+inline constexpr int kCameraPlace = 48;   ///< m, imu axes
+inline constexpr int kLens = 51;          ///< of the left camera, (N.6.9)
+inline constexpr int kRightTurn = 54;     ///< rad, of the right camera against the left one, right camera's axes
+inline constexpr int kTrackDrift = 57;    ///< rad/m, camera axes: a slow turn that all tracks pretend, (N.6.20)
+inline constexpr int kCameraOffset = 60;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
+inline constexpr int kBaseSize = 61;
 inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones;
 
 using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
@@ -65,6 +66,7 @@ struct Mean {
   Eigen::Vector2d mounting = Eigen::Vector2d::Zero();
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();
+  double rear_slip = 0.0;
   double position_latency = 0.0, velocity_latency = 0.0, imu_offset = 0.0, wheel_latency = 0.0;
   Eigen::Vector3d gnss_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d gnss_return = Eigen::Vector3d::Zero();
@@ -84,7 +86,7 @@ struct Mean {
   template <class Archive>
   void serialise(Archive& a) {
     a(t_us, nav.q_level_imu.coeffs(), nav.velocity, nav.position, gyro_bias, accel_bias, gyro_scale, accel_scale,
-      wheel_scale, mounting, p_imu_axle, p_imu_antenna, position_latency, velocity_latency, imu_offset, wheel_latency,
+      wheel_scale, mounting, p_imu_axle, p_imu_antenna, rear_slip, position_latency, velocity_latency, imu_offset, wheel_latency,
       gnss_bias, gnss_velocity_bias, gnss_return, return_rate, T_imu_camera.q.coeffs(), T_imu_camera.p,
       T_left_right.q.coeffs(), T_left_right.p, lens, camera_offset, track_drift);
   }

@@ -47,7 +47,7 @@ FilterStage::FilterStage(const Calibration& calibration, const VoTrackerConfig& 
   spec_.inputs.push_back({"WHEELS", "wheels_t", kWheelLateness_us, 0});
   spec_.clocks = {{kImu, kImuTimeout_us}};
   spec_.outputs = {{"POSE_VO", "pose_t"}, {"VO_STATUS", "vo_status_t"}, {"VO_FEATURES", "vo_features2_t"}};
-  spec_.state_layout = 22;
+  spec_.state_layout = 23;
 }
 
 void FilterStage::make_parts() {

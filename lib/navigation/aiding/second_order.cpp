@@ -72,4 +72,21 @@ void add_second_order(Measurement<1>& m, const Filter& filter, int axis, double 
   m.repeated = gain * gain * left_out.variance(axis) * (2.0 * rho / (1.0 - rho));
 }
 
+/// e = offset - latency, w the velocity's error: e w + A e^2 / 2.
+void add_second_order(Measurement<3>& m, const State& state, const BodyMotion& motion) {
+  const Eigen::MatrixXd& P = state.P();
+  const double late = P(kPositionLatency, kPositionLatency) + P(kImuOffset, kImuOffset) -
+                      2.0 * P(kPositionLatency, kImuOffset);
+  const Eigen::Matrix3d v = skew(state.x.nav.velocity);
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Matrix<double, 1, 6> w = Eigen::Matrix<double, 1, 6>::Zero();
+    w.head<3>() = -v.row(i);
+    w(3 + i) = 1.0;
+    const double both = w.dot(P.block<6, 1>(kAtt, kImuOffset) - P.block<6, 1>(kAtt, kPositionLatency));
+    const double velocity = (w * P.block<6, 6>(kAtt, kAtt) * w.transpose())(0, 0), a = motion.acceleration(i);
+    m.residual(i) -= both + 0.5 * a * late;
+    m.R(i, i) += late * velocity + both * both + 2.0 * a * late * both + 0.5 * a * a * late * late;
+  }
+}
+
 }  // namespace roadfix::navigation

@@ -1,4 +1,5 @@
-/// What the linear rows of the axle's velocity leave out while heading and velocity are unsure, (N.4.15).
+/// What linear rows leave out: of the axle's velocity while heading and velocity are unsure, (N.4.15), and of a place whose time
+/// is, (N.4.16).
 #pragma once
 
 #include "navigation/filter.h"
@@ -15,5 +16,9 @@ SecondOrder second_order(const State& state);
 /// Takes them into account in a measurement of one axis of that velocity, used every `interval` s, while the heading is
 /// unsure. `gain`: of the measurement by the velocity.
 void add_second_order(Measurement<1>& m, const Filter& filter, int axis, double gain, double interval);
+
+
+/// In a position measured at a time that is off, while the car speeds up or turns, or its velocity is unsure: (N.4.16).
+void add_second_order(Measurement<3>& position, const State& state, const BodyMotion& motion);
 
 }  // namespace roadfix::navigation

@@ -45,6 +45,7 @@ BaseVector start_sigmas(const NavigationConfig& c, const StartState& s, double y
   std.segment<6>(kGyroScale).setConstant(v.scale_std);
   std(kWheelScale) = v.wheel_scale_std;
   std.segment<2>(kMounting) = v.mounting_std.tail<2>();
+  if (v.mounting_known()) std(kRearSlip) = vehicle::kRearSlipStd;
   std.segment<3>(kAxle) = v.p_imu_axle_std;
   std.segment<3>(kAntenna) = v.p_imu_antenna_std;
   const ClockPriors time(v);
@@ -121,6 +122,7 @@ void HeadingHypotheses::add_hypothesis(const inertial::Earth& earth, const Start
   x.nav.q_level_imu = level_attitude(s.mean_accel, yaw);
   x.nav.velocity = s.velocity;
   x.mounting = config_.facts.mounting;
+  x.rear_slip = vehicle::kRearSlip;
   x.p_imu_axle = config_.facts.p_imu_axle;
   x.p_imu_antenna = config_.facts.p_imu_antenna;
   if (!s.local) x.nav.position = s.antenna - x.nav.q_level_imu * x.p_imu_antenna;

@@ -9,7 +9,7 @@ namespace roadfix::navigation {
 
 struct Memory {
   static constexpr int kFirst =
-      kGyroBias;  ///< error states that are kept: biases, scales, wheels, mounting, axle, antenna
+      kGyroBias;  ///< error states that are kept: biases, scales, wheels, mounting, axle, antenna, slip
   static constexpr int kKept = kPositionLatency - kGyroBias;
   using Kept = Eigen::Matrix<double, kKept, 1>;
 

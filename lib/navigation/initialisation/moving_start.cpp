@@ -65,6 +65,7 @@ MovingStart::Beginning MovingStart::guess(const NavigationConfig& config) const 
   const VehicleFacts& facts = config.facts;
   if (facts.mounting_known()) b.velocity = kGuess * (vehicle::R_imu_vehicle(facts.mounting) * Eigen::Vector3d::UnitX());
   b.sensors.mounting = facts.mounting;
+  b.sensors.rear_slip = vehicle::kRearSlip;
   b.sensors.p_imu_axle = facts.p_imu_axle;
   b.sensors.p_imu_antenna = facts.p_imu_antenna;
   b.sensors.T_imu_camera = facts.camera->T_imu_camera;

@@ -30,6 +30,7 @@ class RandomNavigationState {
     x.accel_scale = vector(1e-3);
     x.wheel_scale = number(0.02);
     x.mounting = vector(0.05).head<2>();
+    x.rear_slip = number(0.005);
     x.p_imu_axle = {number(1.0), 0.4, -0.6};
     x.p_imu_antenna = {-0.3, 0.2, 1.4};
     x.position_latency = number(0.1);

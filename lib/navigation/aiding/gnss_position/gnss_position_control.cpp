@@ -5,6 +5,7 @@
 
 #include "navigation/aiding/gnss_error_states.h"
 #include "navigation/aiding/gnss_position/gnss_position_model.h"
+#include "navigation/aiding/second_order.h"
 #include "statistics/chance.h"
 
 namespace roadfix::navigation {
@@ -149,6 +150,7 @@ Measurement<3> GnssPositionControl::measurement(const Filter& filter, const Queu
   const double white = (1.0 - bias.like.share) * variance_factor(fix.fix_type);
   Measurement<3> m =
       gnss_position(filter.state(), filter.motion(), fix.value, white * fix.cov, fix.ahead(filter.state().x));
+  add_second_order(m, filter.state(), filter.motion());
   m.shows_steps = !displaced();  // how a displacement moves is assumed
   if (!bias.anew) return m;
   m.residual += filter.state().x.gnss_bias;

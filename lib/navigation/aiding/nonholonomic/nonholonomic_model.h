@@ -1,4 +1,4 @@
-/// Non-holonomic constraint: no velocity sideways or up at the rear axle, (N.4.7) of MODEL.md.
+/// Non-holonomic constraint: no velocity up at the rear axle, and sideways what its tyres slip, (N.4.7) of MODEL.md.
 #pragma once
 
 #include "navigation/filter.h"

@@ -1,4 +1,4 @@
-/// A prior pose from outside as a measurement, (N.4.16) and (N.4.17) of MODEL.md.
+/// A prior pose from outside as a measurement, (N.4.17) and (N.4.18) of MODEL.md.
 #pragma once
 
 #include "navigation/filter.h"
