@@ -86,8 +86,8 @@ struct Mean {
   template <class Archive>
   void serialise(Archive& a) {
     a(t_us, nav.q_level_imu.coeffs(), nav.velocity, nav.position, gyro_bias, accel_bias, gyro_scale, accel_scale,
-      wheel_scale, mounting, p_imu_axle, p_imu_antenna, rear_slip, position_latency, velocity_latency, imu_offset, wheel_latency,
-      gnss_bias, gnss_velocity_bias, gnss_return, return_rate, T_imu_camera.q.coeffs(), T_imu_camera.p,
+      wheel_scale, mounting, p_imu_axle, p_imu_antenna, rear_slip, position_latency, velocity_latency, imu_offset,
+      wheel_latency, gnss_bias, gnss_velocity_bias, gnss_return, return_rate, T_imu_camera.q.coeffs(), T_imu_camera.p,
       T_left_right.q.coeffs(), T_left_right.p, lens, camera_offset, track_drift);
   }
 };

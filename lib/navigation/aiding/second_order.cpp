@@ -75,8 +75,8 @@ void add_second_order(Measurement<1>& m, const Filter& filter, int axis, double 
 /// e = offset - latency, w the velocity's error: e w + A e^2 / 2.
 void add_second_order(Measurement<3>& m, const State& state, const BodyMotion& motion) {
   const Eigen::MatrixXd& P = state.P();
-  const double late = P(kPositionLatency, kPositionLatency) + P(kImuOffset, kImuOffset) -
-                      2.0 * P(kPositionLatency, kImuOffset);
+  const double late =
+      P(kPositionLatency, kPositionLatency) + P(kImuOffset, kImuOffset) - 2.0 * P(kPositionLatency, kImuOffset);
   const Eigen::Matrix3d v = skew(state.x.nav.velocity);
   for (int i = 0; i < 3; ++i) {
     Eigen::Matrix<double, 1, 6> w = Eigen::Matrix<double, 1, 6>::Zero();

@@ -17,7 +17,6 @@ SecondOrder second_order(const State& state);
 /// unsure. `gain`: of the measurement by the velocity.
 void add_second_order(Measurement<1>& m, const Filter& filter, int axis, double gain, double interval);
 
-
 /// In a position measured at a time that is off, while the car speeds up or turns, or its velocity is unsure: (N.4.16).
 void add_second_order(Measurement<3>& position, const State& state, const BodyMotion& motion);
 
