@@ -53,8 +53,8 @@ Ahead ahead_of(const FusionNow& now, const NewestSample& n) {
 /// A pose of the horizon, carried on to now: by what is ahead as far as that is relied on.
 Odometry carried(const FusionNow& now, const CarriedPose& pose, const Ahead& ahead) {
   const int64_t now_us = ahead.newest ? ahead.newest->t_us : now.t_us;
-  const bool relied =
-      ahead.joined && (now.channel(ahead.channel).good(now.t_us) || now.local.leader() == ahead.channel);
+  const bool relied = ahead.newest != nullptr && ahead.joined &&
+                      (now.channel(ahead.channel).good(now.t_us) || now.local.leader() == ahead.channel);
   MotionStep tail;
   tail.add(now.local.motion(now.channels, pose.t_us(), relied ? now.t_us : now_us));
   if (relied) tail.add(now.channel(ahead.channel).corrected(ahead.motion, ahead.rise, ahead.dt));
