@@ -1,5 +1,5 @@
-/// How large a channel's errors are that are new from step to step, as configured, as windows show them, and as a filter claims
-/// (MODEL.md, section 4).
+/// How large a channel's errors are that are new from step to step: as configured, as windows show them, and as a filter
+/// claims (MODEL.md, section 4).
 #pragma once
 
 #include "fusion/fusion_config.h"
@@ -13,7 +13,8 @@ class ChannelErrors {
 
   /// The variance of its yaw as it claims it, before and now, dt seconds later.
   void see_yaw(double before, double now, double dt);
-  /// Covariance of a motion of dt seconds. `claims`: its velocity's covariance counts, and the growth of its yaw's; or null.
+  /// Covariance of a motion of dt seconds. `claims`: its velocity's covariance counts, and the growth of its yaw's; or
+  /// null.
   [[nodiscard]] Eigen::Matrix3d of_step(double dt, const Odometry* claims) const;
   /// Covariance of a window's motion, start and end jitter included (F.5.2).
   [[nodiscard]] Eigen::Matrix3d of_window(const Planar& motion, double dt) const;

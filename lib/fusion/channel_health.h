@@ -1,4 +1,4 @@
-/// Whether a channel can be relied on: by its own word, by what it repeats, and by what the other channels say of it (MODEL.md,
+/// Whether a channel can be relied on: by its own validity, by whether it is frozen, and by the other channels (MODEL.md,
 /// section 4).
 #pragma once
 

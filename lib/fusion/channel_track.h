@@ -1,5 +1,5 @@
-/// Sum of a channel's measured motions, at any time of the last second: a witness that is late is compared, and carried on by, at its
-/// own time (MODEL.md, section 4).
+/// Sum of a channel's measured motions, at any time of the last 0.8 s: a witness that is late is compared, and carried on
+/// by, at its own time (MODEL.md, sections 6 and 7).
 #pragma once
 
 #include <cstdint>

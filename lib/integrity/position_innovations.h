@@ -1,11 +1,10 @@
-/// What the innovations of an estimate's GNSS positions say: how large they are beside their claims, whether their mean is
-/// theirs by chance, and when the last position was used or rejected. lib/integrity/MODEL.md, (P.2.n) and (P.3.2).
+/// Statistics of the innovations of an estimate's GNSS positions: how large they are beside their claims, whether their
+/// mean is so by chance, and when the last position was used or rejected. lib/integrity/MODEL.md, (P.2.n) and (P.3.2).
 #pragma once
 
+#include <Eigen/Dense>
 #include <cstdint>
 #include <optional>
-
-#include <Eigen/Dense>
 
 #include "integrity/error_scale.h"
 #include "integrity/integrity_config.h"

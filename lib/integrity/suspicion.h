@@ -1,5 +1,5 @@
-/// Whether positions are under suspicion, and the pose from before that, which what comes is held against: lib/integrity/MODEL.md,
-/// (P.5.n).
+/// Whether positions are under suspicion, and the pose from before that, which what comes is held against:
+/// lib/integrity/MODEL.md, (P.5.n).
 #pragma once
 
 #include <cstdint>

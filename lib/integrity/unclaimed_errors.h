@@ -1,5 +1,5 @@
-/// Errors of a pose that its covariance does not have: the lever arm's, as the last positions saw it, and a heading that follows
-/// late in turns. lib/integrity/MODEL.md, (P.3.1) and (P.3.3).
+/// Errors of a pose that its covariance does not have: the lever arm's, as the last positions saw it, and a heading that
+/// follows late in turns. lib/integrity/MODEL.md, (P.3.1) and (P.3.3).
 #pragma once
 
 #include <Eigen/Dense>

@@ -66,7 +66,7 @@ struct Mean {
   Eigen::Vector2d mounting = Eigen::Vector2d::Zero();
   Eigen::Vector3d p_imu_axle = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_imu_antenna = Eigen::Vector3d::Zero();
-  double rear_slip = 0.0;
+  double rear_slip = 0.0;  ///< rad per m/s2
   double position_latency = 0.0, velocity_latency = 0.0, imu_offset = 0.0, wheel_latency = 0.0;
   Eigen::Vector3d gnss_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d gnss_return = Eigen::Vector3d::Zero();

@@ -10,7 +10,7 @@ namespace {
 constexpr double kMostRatio = 16.0;  // a residual counts at most as four sigma
 constexpr double kMostCorrelation = 0.9;
 // So that both can grow again: a tenth of the least that is used, and of what tyres slip at walking pace (3.6 mrad per
-// m/s2, config.h).
+// m/s2, driving.h).
 constexpr double kLeastLearnt = 1.0e-4;  // m/s
 constexpr double kLeastSlope = 2.0e-4;   // s
 

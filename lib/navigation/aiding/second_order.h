@@ -1,5 +1,5 @@
-/// What linear rows leave out: of the axle's velocity while heading and velocity are unsure, (N.4.15), and of a place whose time
-/// is, (N.4.16).
+/// What linear rows leave out: of the axle's velocity while heading and velocity are unsure, (N.4.15), and of a place
+/// whose time is, (N.4.16).
 #pragma once
 
 #include "navigation/filter.h"

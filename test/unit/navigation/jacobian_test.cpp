@@ -189,3 +189,55 @@ TEST_CASE("what the linear rows of the axle's velocity leave out is what drawn e
     CHECK(std::abs(mean.x() + expected.mean.x()) > 1.5 * std::abs(expected.mean.x()));
   }
 }
+
+TEST_CASE("what the linear rows of a fix whose time is unsure leave out is what drawn errors show") {
+  constexpr int kDraws = 40'000;
+  test::RandomNavigationState random(6);
+  const auto measured = [](const State& state, const BodyMotion& motion) {
+    const double ahead = state.x.imu_offset - state.x.position_latency;
+    return gnss_position(state, motion, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity(), ahead);
+  };
+  for (int trial = 0; trial < 4; ++trial) {
+    Mean x = random.mean(0.3);
+    x.p_imu_antenna.setZero();
+    BodyMotion motion;
+    motion.acceleration = Eigen::Vector3d(2.5, -1.5, 0.5);
+    // Correlated errors of velocity, heading and both clocks.
+    Eigen::Matrix<double, kBaseSize, 5> root = Eigen::Matrix<double, kBaseSize, 5>::Zero();
+    for (int i = 0; i < 5; ++i) {
+      root.block<3, 1>(kVel, i) = random.vector(0.2);
+      root(kAtt + 2, i) = random.number(0.005);
+      root(kPositionLatency, i) = random.number(0.1);
+      root(kImuOffset, i) = random.number(0.05);
+    }
+    State state = with_mean(x, x.nav.position);
+    state.P() = (root * root.transpose()).topLeftCorner(state.P().rows(), state.P().cols());
+    const Measurement<3> linear = measured(state, motion);
+    Measurement<3> whole = linear;
+    add_second_order(whole, state, motion);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero(), squares = sum;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      BaseVector d = BaseVector::Zero();
+      for (int i = 0; i < 5; ++i) d += random.number(1.0) * root.col(i);
+      const State drawn = with_mean(retract(x, d, x.nav.position), x.nav.position);
+      const Eigen::Vector3d left =
+          linear.residual - measured(drawn, motion).residual - linear.H * d.head<kWithoutCamera>();
+      sum += left;
+      squares += left.cwiseAbs2();
+    }
+    const Eigen::Vector3d mean = sum / kDraws, variance = squares / kDraws - mean.cwiseAbs2();
+    const Eigen::Vector3d expected = linear.residual - whole.residual, spread = (whole.R - linear.R).diagonal();
+    CAPTURE(mean.transpose(), expected.transpose(), variance.transpose(), spread.transpose());
+    for (int axis = 0; axis < 3; ++axis) {
+      // Five sigmas of the drawn mean, and what the third order of the errors adds.
+      const double slack = 5.0 * std::sqrt(variance(axis) / kDraws) + 0.02 * expected.cwiseAbs().maxCoeff();
+      CHECK(std::abs(mean(axis) - expected(axis)) < slack);
+      CHECK(std::abs(variance(axis) - spread(axis)) < 0.1 * spread.maxCoeff());
+    }
+    // Teeth: without, or with the sign wrong, they would be others.
+    Eigen::Index most = 0;
+    expected.cwiseAbs().maxCoeff(&most);
+    CHECK(std::abs(mean(most)) > 0.5 * std::abs(expected(most)));
+    CHECK(std::abs(mean(most) + expected(most)) > 1.5 * std::abs(expected(most)));
+  }
+}

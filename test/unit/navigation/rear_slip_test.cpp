@@ -1,5 +1,5 @@
-// A bend's slip is none of the clocks': cars whose GNSS latencies are known to tenths of a second only, with tyres that slip as
-// those of cars do, and as those of none do.
+// A bend's slip is none of the clocks': cars whose GNSS latencies are known to tenths of a second only, with tyres that
+// slip as those of cars do, and as those of none do.
 #include <catch2/catch.hpp>
 #include <cstdio>
 

@@ -14,14 +14,13 @@ constexpr double kAccelStep = 0.15;  // m/s2, along the way
 constexpr int kFix_us = 250'000;
 
 /// A car that drives straight on at constant speed, with places of 2 cm; its accelerometer reads `bias` too much from the
-/// beginning on, which the filter does not know of and which is no step to it until it is told of one.
+/// beginning on, which the filter does not estimate until a step of that bias is taken back.
 class StraightDrive {
  public:
   explicit StraightDrive(double bias) : bias_(bias), filter_(NavigationConfig(), inertial::Earth(), false) {
     Mean x;
     x.t_us = t_us_;
     x.nav.velocity.x() = kSpeed;
-    x.accel_bias.x() = 0.0;
     BaseVector std = BaseVector::Constant(1e-3);
     std.segment<3>(kVel).setConstant(0.02);
     std.segment<3>(kPos).setConstant(0.02);
