@@ -41,24 +41,6 @@ Columns::Columns(const State& state) {
   for (const Clone& c : state.clones) blocks_[count_++] = {c.at, 6};
 }
 
-void triangulate_columns(Eigen::Ref<Eigen::MatrixXd> A, int pivots) {
-  const auto rows = static_cast<int>(A.rows()), columns = static_cast<int>(A.cols());
-  for (int k = 0; k < std::min(pivots, rows - 1); ++k) {
-    auto x = A.col(k).tail(rows - k);
-    const double norm = x.norm();
-    if (norm == 0.0) continue;
-    const double end = x(0) > 0.0 ? -norm : norm;
-    x(0) -= end;
-    const double scale = 2.0 / x.squaredNorm();
-    for (int j = k + 1; j < columns; ++j) {
-      auto y = A.col(j).tail(rows - k);
-      y -= (scale * x.dot(y)) * x;
-    }
-    x.setZero();
-    x(0) = end;
-  }
-}
-
 Update::Update()
     : H_(kMaxRows, kMaxSize), PHt_(kMaxSize, kMaxRows), S_(kMaxRows, kMaxRows), r_(kMaxRows), d_(kMaxSize) {}
 

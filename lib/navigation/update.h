@@ -83,9 +83,6 @@ class Columns {
   size_t count_ = 0;
 };
 
-/// In-place Householder reflections: the leading `pivots` columns of A become upper triangular, all others turn along.
-void triangulate_columns(Eigen::Ref<Eigen::MatrixXd> A, int pivots);
-
 /// Collects rows and applies them at once; its memory is taken once.
 class Update {
  public:

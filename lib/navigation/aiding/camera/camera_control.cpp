@@ -51,7 +51,10 @@ int64_t micros(double s) { return static_cast<int64_t>(std::llround(1e6 * s)); }
 }  // namespace
 
 CameraControl::CameraControl(const CameraTuning& tuning, const CameraFacts& facts)
-    : tuning_(tuning), left_(facts.left), stamps_(facts.rate, facts.stamp_jitter), update_(tuning.tracks) {
+    : tuning_(tuning),
+      left_(facts.left),
+      stamps_(facts.rate, facts.stamp_jitter),
+      update_(tuning.tracks, tuning.tracks_per_update) {
   if (facts.right) right_.emplace(*facts.right);
   window_.two_eyes = right_.has_value();
   chosen_.reserve(static_cast<size_t>(tuning.tracks_per_update));
@@ -176,6 +179,7 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing, Fi
   }
   if (fitness_ == CameraFitness::kFit && counts.used > 0) {
     if (!iterated) {
+      if (course == nullptr) update_.weigh_together();
       record.status = apply(state) ? AidingStatus::kAccepted : AidingStatus::kBadInput;
     } else if (settled) {
       state = std::move(*settled);

@@ -41,13 +41,17 @@ struct TrackWindow {
 
 class TrackUpdate {
  public:
-  explicit TrackUpdate(const TrackTuning& tuning);
+  /// At most that many tracks at a time.
+  TrackUpdate(const TrackTuning& tuning, int most_tracks);
 
   /// Opens an update.
   void begin(const TrackWindow& window);
   /// One finished track. False where it was not used.
   bool add(std::span<const ViewSighting> sightings);
-  /// [H | r] of all that was added, white, at most as many rows as columns; valid until the next begin().
+  /// Weighs each track by what all of them together leave of it, (N.6.11).
+  void weigh_together();
+  /// [H | r] of all that was added, white, times the roots of their weights; at most as many rows as columns; valid until
+  /// the next call.
   [[nodiscard]] Eigen::Ref<const Eigen::MatrixXd> rows();
 
   [[nodiscard]] const TrackCounts& counts() const { return counts_; }
@@ -56,21 +60,37 @@ class TrackUpdate {
 
  private:
   static constexpr int kStackRows = 1024;
-  static constexpr size_t kMostMisfits = 256;
+  static constexpr int kReweighings = 2;
 
-  /// Squared length of the rows' residual by what is expected of it; infinite where that breaks.
-  [[nodiscard]] double nis(int first_row, int rows, const Eigen::MatrixXd& P, bool about_means);
-  void push(const Eigen::Ref<const Eigen::MatrixXd>& rows);
+  /// Rows of `kept_`.
+  struct Kept {
+    int first = 0, rows = 0;
+    double weight = 1.0;
+    double spread = 1.0;  ///< variance that the state expects of them, mean of the rows, over their noise's
+  };
+
+  struct Expected {
+    double nis = 0.0;     ///< squared length of the residual by what is expected of it; infinite where that breaks
+    double spread = 1.0;  ///< see Kept
+  };
+  [[nodiscard]] Expected expected(int first_row, int rows, const Eigen::MatrixXd& P, bool about_means);
+  [[nodiscard]] double weight(double squared, int dof) const;
+  void push(const Kept& track);
   void compress();
+  /// By how much the rows would move the columns.
+  void find_correction();
 
   TrackTuning tuning_;
   TrackCounts counts_;
   std::vector<double> misfits_;  ///< of the tracks tried
   const TrackWindow* window_ = nullptr;
   std::array<ViewSighting, kMaxViews> straight_;
-  Eigen::MatrixXd work_;   ///< kMaxTrackRows x kTrackWidth
+  Eigen::MatrixXd work_;  ///< kMaxTrackRows x kTrackWidth
+  Eigen::MatrixXd kept_;  ///< kMaxTrackRows for each of the most tracks: white, without their weights
+  std::vector<Kept> tracks_;
   Eigen::MatrixXd stack_;  ///< kStackRows x (columns + 1)
   Eigen::MatrixXd HP_, S_;
+  Eigen::VectorXd innovation_, correction_;
   int stacked_ = 0;
 };
 

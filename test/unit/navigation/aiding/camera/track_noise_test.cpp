@@ -104,7 +104,7 @@ Claim claim(double told_sigma_px, double told_walk_px) {
     TrackTuning tuning;
     tuning.refuse = 1e9;
     tuning.tails = 1e9;
-    TrackUpdate update(tuning);
+    TrackUpdate update(tuning, 200);
     update.begin(estimate);
     for (int k = 0; k < kTracks; ++k) {
       const Eigen::Vector2d z(0.3 * random.normal(), 0.1 * random.normal());
