@@ -81,8 +81,8 @@ VisualDrive make_drive(const VisualDriveConfig& config, uint64_t seed) {
                  std::llround(1e6 * (config.time_offset + config.stamp_jitter * jitter.normal()));
     int outliers = 0;
     for (const TrackObservation& o : tracks.observe(view)) {
-      const double noise = config.tracks.noise_px;  // white, of each eye
-      TrackSighting sighting{o.id, o.left, {}, noise, 0.0, std::sqrt(2.0) * noise};
+      const double noise = config.tracks.noise_px;  // of each eye
+      TrackSighting sighting{o.id, o.left, {}, noise, config.tracks.walk_px, std::sqrt(2.0) * noise};
       if (config.stereo) sighting.right = o.right;
       frame.tracks.push_back(sighting);
       outliers += o.is_outlier ? 1 : 0;
@@ -105,7 +105,7 @@ navigation::NavigationConfig filter_config(const VisualDriveConfig& config) {
   v.correlation_s = 1e6;
   v.wheel_scale_std = s.wheels.speed_scale_std;
   v.wheels.speed_noise = s.wheels.speed_noise_mps;
-  v.mounting_std.setConstant(1e-3);
+  v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
   navigation::CameraFacts& camera = v.camera.emplace();
   camera.left = lens();
   camera.T_imu_camera = T_vehicle_camera();

@@ -1,4 +1,5 @@
-/// Drives of the navigation filter without GNSS on tracks without pixels; prints one JSON object a line.
+/// Drives of the navigation filter without GNSS on tracks without pixels, with the noise of drawn pictures; prints one JSON
+/// object a line. Cars differ in what the filter's prior leaves open: how the imu is mounted, what the rear tyres slip.
 ///   msckf_drives city|short|turn|highway FIRST_SEED LAST_SEED [--wheels]
 /// first_s: of the first valid pose.
 /// drift_pct: error of the position at the end over the way driven. scale_pct: of the distance driven in the ten
@@ -10,19 +11,28 @@
 #include "program.h"
 #include "simulation/random.h"
 #include "support/visual_drive.h"
+#include "vehicle/driving.h"
 
 namespace roadfix {
 namespace {
 
 constexpr double kLearntScaleStd = 1e-3;
-constexpr double kTurnScored = 12.0;  // s after it, at the new speed
+constexpr double kTurnScored = 12.0;   // s after it, at the new speed
+constexpr double kMountingStd = 1e-3;  // rad
 
-test::VisualDriveConfig drive_of(const std::string& name) {
+test::VisualDriveConfig street_of(const std::string& name) {
   if (name == "city") return test::city_drive(240.0);
   if (name == "highway") return test::highway_drive(180.0);
   if (name == "short") return test::city_drive(60.0);
   if (name == "turn") return test::turn_drive();
   throw std::invalid_argument("no drive named " + name);
+}
+
+test::VisualDriveConfig drive_of(const std::string& name) {
+  test::VisualDriveConfig car = street_of(name);
+  car.tracks = with_noise_of_pictures(car.tracks);
+  car.scenario.imu.mounting_std_rad.setConstant(kMountingStd);
+  return car;
 }
 
 struct Result {
@@ -37,7 +47,10 @@ double length_of(const std::vector<Eigen::Vector3d>& points) {
   return sum;
 }
 
-Result drive(const test::VisualDriveConfig& car, uint64_t seed, bool wheels, bool learnt, double scored_from_s) {
+Result drive(test::VisualDriveConfig car, uint64_t seed, bool wheels, bool learnt, double scored_from_s) {
+  RandomStream tyres(seed, 0x5119);
+  car.scenario.motion.rear_slip_rad_per_mps2 =
+      std::max(0.0, vehicle::kRearSlip + vehicle::kRearSlipStd * tyres.normal());
   test::VisualDrive d = test::make_drive(car, seed);
   navigation::NavigationConfig config = test::filter_config(car);
   config.sources.wheel_speed = wheels;
@@ -66,16 +79,16 @@ Result drive(const test::VisualDriveConfig& car, uint64_t seed, bool wheels, boo
     all.push_back(d.drive.truth_at(last.odometry.t_us).T_frame_vehicle.p);
     if (seconds_between(start, last.odometry.t_us) < scored_from_s) return;
     truth.push_back(all.back());
-    estimate.push_back(last.odometry.T_frame_vehicle.p);
+    estimate.push_back(last.imu.T_frame_vehicle.p);
   });
-  const Eigen::Matrix<double, 9, 1> e = test::error_of(last.odometry, d);
+  const Eigen::Matrix<double, 9, 1> e = test::error_of(last.imu, d);
   const auto square = [](const Eigen::Vector3d& x, const Eigen::Matrix3d& P) { return x.dot(P.inverse() * x) / 3.0; };
-  const Matrix6d& P = last.odometry.cov_pose;
+  const Matrix6d& P = last.imu.cov_pose;
   r.way = length_of(all);
   r.error = e.head<3>().norm();
   r.sigma = std::sqrt(P.topLeftCorner<3, 3>().trace());
   r.nees = (square(e.head<3>(), P.topLeftCorner<3, 3>()) + square(e.segment<3>(3), P.bottomRightCorner<3, 3>()) +
-            square(e.tail<3>(), last.odometry.cov_velocity)) /
+            square(e.tail<3>(), last.imu.cov_velocity)) /
            3.0;
   if (truth.size() > 1) r.scale = length_of(estimate) / length_of(truth) - 1.0;
   r.resets = last.reset_counter;

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 #include "simulation/random.h"
 
 namespace roadfix {
@@ -55,6 +56,7 @@ struct Track {
   bool mismatched = false;
   double noise_px = 0.0, walk_px = 0.0;
   Eigen::Vector2d walked = Eigen::Vector2d::Zero();  // px
+  double found_at_m = 0.0;                           // on the camera's way
 };
 
 }  // namespace
@@ -63,6 +65,7 @@ TrackConfig with_noise_of_pictures(TrackConfig config) {
   config.noise_px = 0.1;
   config.walk_px = 0.15;
   config.noise_spread = 0.5;
+  config.turn_radpm = {4e-6, -1e-6, -1.6e-5};
   return config;
 }
 
@@ -77,6 +80,8 @@ struct TrackSimulator::Impl {
   std::vector<std::vector<SurfacePoint>> mover_points;
   std::vector<Track> tracks;
   std::int64_t next_id = 1;
+  double way_m = 0.0;  // of the camera
+  std::optional<Eigen::Vector3d> seen_from;
   double widest;  // tangent of the half field of view, level
 
   Impl(const World& w, const TrackConfig& c, const Camera& l, const std::optional<RightCamera>& r, std::uint64_t seed)
@@ -142,6 +147,15 @@ struct TrackSimulator::Impl {
     track.walked += track.walk_px * Eigen::Vector2d(u, v);
   }
 
+  /// Where a track is seen whose point would be at the pixel: as if the camera had turned since the track was found.
+  [[nodiscard]] Eigen::Vector2d pretended(const Camera& camera, const Track& track,
+                                          const Eigen::Vector2d& pixel) const {
+    const auto seen = camera.unproject(pixel);
+    if (!seen || config.turn_radpm.isZero()) return pixel;
+    const Eigen::Vector3d ray = exp_so3(-(way_m - track.found_at_m) * config.turn_radpm) * seen->homogeneous();
+    return camera.distort(ray.hnormalized()).value_or(pixel);
+  }
+
   std::optional<TrackObservation> observe_one(Track& track, const View& view, const RayWindow& window) {
     const Eigen::Vector3d p = enu(track.point, view.t_s);
     const auto pixel = sees(left, view.T_enu_camera, window, p);
@@ -154,13 +168,13 @@ struct TrackSimulator::Impl {
     }
     TrackObservation o;
     o.id = track.id;
-    o.left = *pixel + track.offset + track.walked + noise(track);
+    o.left = pretended(left, track, *pixel) + track.offset + track.walked + noise(track);
     o.p_enu = p;
     o.is_outlier = track.mismatched || track.point.mover >= 0;
     if (!left.sees(o.left)) return std::nullopt;
     if (right) {
       const auto other = sees(right->camera, view.T_enu_camera * right->T_left_right, window, p);
-      if (other) o.right = *other + track.offset + track.walked + noise(track);
+      if (other) o.right = pretended(right->camera, track, *other) + track.offset + track.walked + noise(track);
       if (o.right && !right->camera.sees(*o.right)) o.right.reset();
     }
     return o;
@@ -224,6 +238,7 @@ struct TrackSimulator::Impl {
       const auto pixel = left.project(p);
       if (!pixel || !left.sees(*pixel, kBorder_px) || !buckets.take(*pixel)) continue;
       Track track{next_id, point};
+      track.found_at_m = way_m;
       draw_noise(track);
       auto o = observe_one(track, view, window);
       if (!o) continue;
@@ -241,6 +256,9 @@ TrackSimulator::~TrackSimulator() = default;
 
 std::vector<TrackObservation> TrackSimulator::observe(const View& view) {
   Impl& s = *impl_;
+  const Eigen::Vector3d& from = view.T_enu_camera.p;
+  s.way_m += (from - s.seen_from.value_or(from)).norm();
+  s.seen_from = from;
   const RayWindow& window = s.scene.prepare(view.T_enu_camera.p, view.t_s, RayUse::kPoints);
   Impl::Buckets buckets(s.left.intrinsics(), s.config.wanted);
   std::vector<TrackObservation> out;

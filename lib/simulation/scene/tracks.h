@@ -24,6 +24,9 @@ struct TrackConfig {
   /// Standard deviation of u and of v by which a track's error moves from picture to picture, as that of a patch does in
   /// drawn and real pictures (tools/experiments/track_noise); a track's own is as much more or less as its noise is.
   double walk_px = 0.0;
+  /// Rad per metre of the camera's way, its axes (x right, y down, z forward): by how much all tracks together pretend that
+  /// it turned since each was found, for the patches of a scene are pulled alike (tools/experiments/vision_drives).
+  Eigen::Vector3d turn_radpm = Eigen::Vector3d::Zero();
   double nearest_m = 1.0;
   double farthest_m = 60.0;
   double loss_per_frame = 0.03;       ///< share of tracks that end though their point is still to be seen

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "geometry/so3.h"
 #include "simulation/scene/tracks.h"
 #include "unit/simulation/scene/streets.h"
 
@@ -186,6 +187,35 @@ TEST_CASE("tracks differ in their noise as far as was asked for, and not at all 
   const auto [spread, median_px] = spread_of(config);
   CHECK(spread == Approx(0.9).epsilon(0.1));
   CHECK(median_px == Approx(0.3).epsilon(0.15));
+}
+
+/// Largest angle, rad, between where tracks of the first picture are seen later on and where they would be had the camera
+/// turned by `told` since.
+double away_from(const Eigen::Vector3d& told) {
+  const StreetPlan plan = test::street();
+  const World world = build_world(plan);
+  const Camera camera(test::lens(640, 240));
+  TrackConfig config = quiet();
+  config.turn_radpm = {4e-4, -1e-4, -1.6e-3};
+  const auto frames = drive(plan, world, config, camera, 10, 3);
+  double way = 0.0, largest = 0.0;
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    const SE3 T_enu_camera = test::view_at(plan, 100 + k).T_enu_camera;
+    way += (T_enu_camera.p - test::view_at(plan, 99 + k).T_enu_camera.p).norm();
+    for (const auto& o : frames[k]) {
+      if (o.id > frames.front().back().id) continue;
+      const Eigen::Vector3d seen = camera.unproject(o.left)->homogeneous().normalized();
+      const Eigen::Vector3d there = exp_so3(-way * told) * (T_enu_camera.inverse() * o.p_enu).normalized();
+      largest = std::max(largest, seen.cross(there).norm());
+    }
+  }
+  REQUIRE(way > 4.0);
+  return largest;
+}
+
+TEST_CASE("all tracks pretend the turn that was asked for since they were found") {
+  CHECK(away_from({4e-4, -1e-4, -1.6e-3}) < 1e-6);
+  CHECK(away_from({4e-4, -1e-4, 1.6e-3}) > 1e-3);
 }
 
 }  // namespace
