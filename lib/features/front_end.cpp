@@ -26,6 +26,13 @@ std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config, std::span
   return std::make_unique<KltTracks>(config);
 }
 
-void fix_opencv_threads() { cv::setNumThreads(1); }
+void fix_opencv_threads() {
+  // Once: the call tears TBB's arena down, under the feet of another thread that is within a loop of OpenCV.
+  static const int threads = [] {
+    cv::setNumThreads(1);
+    return cv::getNumThreads();
+  }();
+  (void)threads;
+}
 
 }  // namespace roadfix

@@ -111,7 +111,7 @@ class FrontEnd {
 std::unique_ptr<FrontEnd> make_front_end(const FrontEndConfig& config,
                                          std::span<const uint8_t> superpoint_weights = {});
 
-/// Disables OpenCV's threads, whose number must not change results. Every main() that processes images calls it.
+/// Disables OpenCV's threads, whose number must not change results. Whatever processes images calls it; from any thread.
 void fix_opencv_threads();
 
 }  // namespace roadfix
