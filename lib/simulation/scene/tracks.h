@@ -25,7 +25,8 @@ struct TrackConfig {
   /// drawn and real pictures (tools/experiments/track_noise); a track's own is as much more or less as its noise is.
   double walk_px = 0.0;
   /// Rad per metre of the camera's way, its axes (x right, y down, z forward): by how much all tracks together pretend that
-  /// it turned since each was found, for the patches of a scene are pulled alike (tools/experiments/vision_drives).
+  /// it turned since each was found, for the patches of a scene are pulled alike; what drawn ones were found to pretend:
+  /// lib/navigation/aiding/camera/EVIDENCE.md.
   Eigen::Vector3d turn_radpm = Eigen::Vector3d::Zero();
   double nearest_m = 1.0;
   double farthest_m = 60.0;
