@@ -13,7 +13,9 @@
 /// (origin ORIGIN_ANTENNA), and sets reference.from_fixes.
 #pragma once
 
+#include <Eigen/Dense>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +35,9 @@ struct ReferenceFacts {
   bool velocity = false;    ///< the reference carries velocity
   bool from_fixes = false;  ///< the reference is the receiver's own fixes: only withheld ones are independent
   double sigma_m = 0.0;     ///< standard deviation of each axis of the reference's positions
+  /// rad, roll, pitch, yaw of the imu's axes in the vehicle's (geometry/euler.h), where they are known for sure: of a
+  /// simulation. Absent: a filter's estimate turns its poses into the reference's axes.
+  std::optional<Eigen::Vector3d> mounting = std::nullopt;
 };
 
 struct ScoreFacts {
@@ -69,6 +74,7 @@ void visit(ReferenceFacts& f, Visitor& v) {
   v.boolean("velocity", f.velocity);
   v.boolean("from_fixes", f.from_fixes);
   v.number("sigma_m", f.sigma_m, 0.0, 100.0);
+  v.optional_vector("mounting_rad", f.mounting, -3.2, 3.2);
 }
 
 template <class Visitor>

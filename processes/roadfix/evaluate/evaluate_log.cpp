@@ -28,7 +28,7 @@ std::vector<std::string> chosen_channels(const EvaluationRequest& request, const
 EstimateInput estimate_input(const std::string& channel, PoseStream stream, const PoseStream& reference,
                              const EvaluationLog& log, const EvaluationLog& truth, EvaluationReport& report) {
   if (reference.anchor) move_to_anchor(stream, *reference.anchor);
-  turn_to_imu_axes(channel, log, truth.calibration, stream);
+  turn_to_imu_axes(channel, log, truth, stream);
   EstimateInput input;
   input.channel = channel;
   input.local_frame = stream.local_frame || reference.local_frame;

@@ -11,7 +11,9 @@
 #include "bus/types/schema.h"
 #include "config/config.h"
 #include "geodesy/enu_change.h"
+#include "geometry/euler.h"
 #include "geometry/frames.h"
+#include "geometry/so3.h"
 #include "roadfix/aiding_t.hpp"
 #include "roadfix/config_t.hpp"
 #include "roadfix/ins_status_t.hpp"
@@ -300,13 +302,23 @@ void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {
   stream.anchor = anchor;
 }
 
-void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const Calibration& calibration,
+void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const EvaluationLog& truth,
                       PoseStream& stream) {
-  const Eigen::Quaterniond told = calibration.q_vehicle_body();
-  const bool learnt = channel == "POSE_INS" || channel == "POSE_FUSED";
+  MountingSeries::Mounting told{truth.calibration.q_vehicle_body(), Eigen::Vector3d::Zero()};
+  const bool estimated = channel == "POSE_INS" || channel == "POSE_FUSED";
+  const bool learnt = estimated && !truth.facts.reference.mounting;
+  if (estimated && !learnt) {
+    const Eigen::Vector3d& angles = *truth.facts.reference.mounting;
+    told.q_vehicle_body = quaternion({angles.z(), angles.y(), angles.x()});
+  }
   for (Odometry& pose : stream.trajectory.poses) {
-    const Eigen::Quaterniond q_vehicle_imu = learnt ? log.mounting.at(pose.t_us, told) : told;
-    if (!q_vehicle_imu.vec().isZero(0.0)) pose = in_axes(q_vehicle_imu, pose);
+    const MountingSeries::Mounting m = learnt ? log.mounting.at(pose.t_us, told.q_vehicle_body) : told;
+    if (!m.q_vehicle_body.vec().isZero(0.0)) pose = in_axes(m.q_vehicle_body, pose);
+    if (m.std.isZero(0.0)) continue;
+    const Eigen::Matrix3d R = m.q_vehicle_body.conjugate().toRotationMatrix();
+    const Eigen::Matrix3d turn = R * m.std.cwiseAbs2().asDiagonal() * R.transpose();
+    pose.cov_pose.bottomRightCorner<3, 3>() += turn;
+    pose.cov_velocity += skew(pose.velocity) * turn * skew(pose.velocity).transpose();
   }
 }
 

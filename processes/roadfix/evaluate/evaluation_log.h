@@ -59,8 +59,9 @@ const PoseStream& poses_of(const EvaluationLog& log, const std::string& channel,
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor);
 
 /// Poses of the vehicle's axes turned into the imu's, those of references and calibrations. The navigation filter has
-/// estimated the turn between them (POSE_FUSED repeats it); the others have the calibration's.
-void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const Calibration& calibration,
+/// estimated the turn between them (POSE_FUSED repeats it): the truth's where `truth` tells it, else what was learnt, whose
+/// doubt is added to the pose's claim as if the two were independent. The others have the calibration's.
+void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const EvaluationLog& truth,
                       PoseStream& stream);
 
 /// The reference of a log, with what may be scored of it. Throws where there is none.

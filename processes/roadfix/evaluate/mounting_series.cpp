@@ -8,18 +8,20 @@ namespace roadfix {
 
 void MountingSeries::add(const ins_status_t& status) {
   const double* angles = status.mounting_rad;
-  q_vehicle_body_.emplace_back(status.utime, quaternion({angles[2], angles[1], angles[0]}));
+  const double* std = status.mounting_std_rad;
+  mountings_.emplace_back(status.utime, Mounting{quaternion({angles[2], angles[1], angles[0]}), {0.0, std[1], std[2]}});
 }
 
-Eigen::Quaterniond MountingSeries::at(int64_t t_us, const Eigen::Quaterniond& told) const {
-  if (q_vehicle_body_.empty()) return told;
-  const auto later = std::lower_bound(q_vehicle_body_.begin(), q_vehicle_body_.end(), t_us,
+MountingSeries::Mounting MountingSeries::at(int64_t t_us, const Eigen::Quaterniond& told) const {
+  if (mountings_.empty()) return {told, Eigen::Vector3d::Zero()};
+  const auto later = std::lower_bound(mountings_.begin(), mountings_.end(), t_us,
                                       [](const auto& entry, int64_t t) { return entry.first < t; });
-  if (later == q_vehicle_body_.begin()) return later->second;
+  if (later == mountings_.begin()) return later->second;
   const auto& before = *std::prev(later);
-  if (later == q_vehicle_body_.end()) return before.second;
+  if (later == mountings_.end()) return before.second;
   const double share = static_cast<double>(t_us - before.first) / static_cast<double>(later->first - before.first);
-  return before.second.slerp(share, later->second);
+  return {before.second.q_vehicle_body.slerp(share, later->second.q_vehicle_body),
+          before.second.std + share * (later->second.std - before.second.std)};
 }
 
 }  // namespace roadfix

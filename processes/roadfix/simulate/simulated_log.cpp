@@ -12,6 +12,7 @@
 #include "bus/types/message.h"
 #include "config/config.h"
 #include "config/config_hash.h"
+#include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "roadfix/import/drive_messages.h"
 #include "roadfix/simulate/scenario_file.h"
@@ -230,6 +231,10 @@ DriveFacts facts_of(const SimulatedDrive& drive) {
   facts.name = drive.config.name;
   facts.first_fix_us = drive.gnss.empty() ? drive.config.start_utime : drive.gnss.front().t_us;
   facts.reference = {ReferenceOf::kImu, true, true, false, 0.0};
+  if (const Eigen::Quaterniond& q = drive.errors.q_vehicle_imu; !q.vec().isZero(0.0)) {
+    const YawPitchRoll angles = yaw_pitch_roll(q);
+    facts.reference.mounting = Eigen::Vector3d(angles.roll, angles.pitch, angles.yaw);
+  }
   if (drive.gnss.empty()) return facts;
   const auto period_us = static_cast<std::int64_t>(std::llround(1e6 / drive.config.gnss.rate_hz));
   for (const Fault& f : drive.config.faults) {
