@@ -3,7 +3,7 @@
 #pragma once
 
 #include "geometry/se3.h"
-#include "slam/considered_scales.h"
+#include "slam/considered_errors.h"
 #include "slam/levelling.h"
 #include "slam/velocity_prior.h"
 
@@ -36,7 +36,7 @@ class AccumulatedCovariance {
   /// Of the last keyframe, with the scale errors of the last image.
   [[nodiscard]] Matrix6d with_scales() const { return keyframe_ + scales_.cov(); }
   [[nodiscard]] const Matrix6d& keyframe() const { return keyframe_; }
-  [[nodiscard]] const ConsideredScales& scales() const { return scales_; }
+  [[nodiscard]] const ConsideredErrors& scales() const { return scales_; }
 
   template <class Self, class Archive>
   static void members(Self& self, Archive& archive) {
@@ -45,7 +45,7 @@ class AccumulatedCovariance {
 
  private:
   Matrix6d keyframe_ = Matrix6d::Zero();
-  ConsideredScales scales_;
+  ConsideredErrors scales_;
 };
 
 }  // namespace roadfix

@@ -203,7 +203,9 @@ BundleReport adjust(BundleProblem& problem, int max_iterations) {
   if (num_free > 0) {
     const int row = 6 * (num_free - 1);
     report.cov_last = cov.block<6, 6>(row, row);
-    report.clustered_cov_last = end.equations.clustered_covariance(cov).block<6, 6>(row, row);
+    const Eigen::MatrixXd clustered = end.equations.clustered_covariance(cov);
+    report.clustered_cov_last = clustered.block<6, 6>(row, row);
+    report.clustered_cov_first = clustered.topLeftCorner<6, 6>();
   }
   report.lens_cov = cov.bottomRightCorner<LensCorrection::kSize, LensCorrection::kSize>();
   const LensCorrection::Matrix lens_information = report.lens_cov.inverse();

@@ -65,6 +65,7 @@ struct BundleReport {
   std::vector<double> error_px;          ///< one per observation, after; infinite where the point is not in front
   Matrix6d cov_last = Matrix6d::Zero();  ///< of the last view relative to the fixed ones, for independent errors
   Matrix6d clustered_cov_last = Matrix6d::Zero();   ///< the same for errors correlated along a track, (S.9.2)
+  Matrix6d clustered_cov_first = Matrix6d::Zero();  ///< likewise of the first view that is not fixed
   std::vector<LensSensitivity> lens_sensitivities;  ///< one per view, relative to the fixed ones
   LensCorrection::Matrix lens_cov = LensCorrection::Matrix::Zero();
 };

@@ -5,7 +5,7 @@
 #include "features/front_end.h"
 #include "features/stereo_matcher.h"
 #include "geometry/se3.h"
-#include "slam/considered_scales.h"
+#include "slam/considered_errors.h"
 
 namespace roadfix {
 
@@ -32,7 +32,8 @@ struct KeyframeTrackerConfig {
   /// Degrees of freedom of Student's t distribution of the sigmas of tracks: smaller values for more variation. On
   /// rendered streets a quarter of the tracks has errors below 0.12 px, a quarter above 0.46 px.
   double track_freedom = 3.0;
-  double gate_px = 2.0;  ///< reprojection error above which an observation is an outlier
+  double gate_px = 2.0;   ///< reprojection error above which an observation is an outlier
+  double drift = 8.0e-6;  ///< rad/m, sigma of a turn about the camera's x and z that all tracks pretend, (S.10.4)
   // Prior sigmas of the calibration correction; zero: calibration fixed.
   double focal_std = 0.01;           ///< relative
   double radial_std = 0.02;          ///< coefficient of r^2 remaining after undistortion
@@ -79,6 +80,7 @@ void visit(KeyframeTrackerConfig& c, Visitor& v) {
   v.number("sigma_px", c.sigma_px, 0.05, 10.0);
   v.number("track_freedom", c.track_freedom, 1.0, 1e9);
   v.number("gate_px", c.gate_px, 0.2, 50.0);
+  v.number("drift_radpm", c.drift, 0.0, 1.0);
   v.number("focal_std", c.focal_std, 0.0, 0.2);
   v.number("radial_std", c.radial_std, 0.0, 0.5);
   v.number("right_turn_std_deg", c.right_turn_std_deg, 0.0, 5.0);

@@ -347,8 +347,8 @@ void KeyframeTracker::clear_map() {
   initialiser_.reset();
 }
 
-ScaleSensitivity KeyframeTracker::scale_sensitivity_at(int64_t t_us) const {
-  return vehicle_.sensitivity_at(t_us, out_, camera_, prior_.velocity, mapping_.scale_sigmas());
+ConsideredColumns KeyframeTracker::considered_at(int64_t t_us) const {
+  return vehicle_.considered_at(t_us, out_, camera_, prior_.velocity, mapping_.scale_sigmas());
 }
 
 Odometry KeyframeTracker::at(int64_t t_us) const {

@@ -52,7 +52,7 @@ class KeyframeTracker {
   /// Last pose extrapolated to another time with the last motion; invalid beyond the time limit.
   [[nodiscard]] Odometry at(int64_t t_us) const;
   /// Scale sensitivity of that pose.
-  [[nodiscard]] ScaleSensitivity scale_sensitivity_at(int64_t t_us) const;
+  [[nodiscard]] ConsideredColumns considered_at(int64_t t_us) const;
   /// The same pose with all loops closed.
   [[nodiscard]] Odometry closed(Odometry odometry) const;
 

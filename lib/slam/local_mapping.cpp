@@ -19,6 +19,7 @@ LocalMapping::LocalMapping(const KeyframeTrackerConfig& config, const CameraRig&
                            std::unique_ptr<RightImageMatcher> matcher, Executor& executor)
     : rig_(rig),
       bundle_iterations_(config.bundle_iterations),
+      drift_(config.drift),
       left_(rig.left),
       right_(rig.right.value_or(rig.left)),
       matcher_(std::move(matcher)),
@@ -47,7 +48,7 @@ int LocalMapping::insert(const Keyframe& keyframe, std::span<const KeyframeFeatu
   if (map_.empty()) {
     begun_us_ = keyframe.t_us;
     cov_own_.setZero();
-    cov_window_.setZero();
+    cov_passing_.setZero();
   } else {
     const SE3& T_map_before = map_.last().T_map_camera;
     cov_own_ = transported(cov_own_, T_map_before, T_map_before.inverse() * keyframe.T_map_camera);
@@ -113,13 +114,22 @@ std::optional<MapAdjustment> LocalMapping::finish_adjustment() {
   const auto job = std::exchange(job_, nullptr);
   MapAdjustment result;
   result.outliers = map_.apply(*job);
-  // From the last fixed keyframe to the newest, (S.9.1).
   const auto& views = job->problem.views;
-  const auto steps = std::count_if(views.begin(), views.end(), [](const auto& view) { return !view.fixed; });
-  result.cov_keyframe = job->report.clustered_cov_last / static_cast<double>(std::max<ptrdiff_t>(1, steps));
+  const auto first = std::find_if(views.begin(), views.end(), [](const auto& view) { return !view.fixed; });
+  if (first != views.end()) {
+    // What the first has wrong each later one will have when it is the first.
+    const SE3& T_map_newest = views.back().T_map_camera;
+    Matrix6d adds_up = Matrix6d::Zero();
+    for (auto view = views.end(); view-- != first;) {
+      const SE3& T_map_view = view->T_map_camera;
+      const Matrix6d own = at_pose(job->report.clustered_cov_first, first->T_map_camera, T_map_view);
+      result.cov_keyframe = transported(own, T_map_view, T_map_view.inverse() * T_map_newest);
+      adds_up += result.cov_keyframe;
+    }
+    cov_passing_ = besides(job->report.clustered_cov_last, adds_up, T_map_newest);
+  }
   result.scale_drift = scale_drift(*job);
   cov_own_ += result.cov_keyframe;
-  cov_window_ = job->report.clustered_cov_last;
   return result;
 }
 
@@ -165,21 +175,22 @@ std::optional<ScaleMeasurement> LocalMapping::measure_scale(const DistancePrior&
 }
 
 ScaleSigmas LocalMapping::scale_sigmas() const {
-  if (stereo() && !map_.right_camera_lost()) return rig_.scale_sigmas;
-  const double turns = map_.focal_std();
-  if (stereo()) return {std::max(rig_.scale_sigmas.length, scale_std_), std::max(rig_.scale_sigmas.rotation, turns)};
-  return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, turns};
+  const ScaleSigmas& rig = rig_.scale_sigmas;
+  if (stereo() && !map_.right_camera_lost()) return {rig.length, rig.rotation, drift_};
+  const double focal = map_.focal_std();
+  if (stereo()) return {std::max(rig.length, scale_std_), std::max(rig.rotation, focal), drift_};
+  return {scale_ == ScaleSource::kNone ? 0.0 : scale_std_, focal, drift_};
 }
 
 void LocalMapping::move(const SE3& T_new_old) {
   map_.move(T_new_old);
   cov_own_ = rotated(cov_own_, {T_new_old.q, {}, 1.0});
-  cov_window_ = rotated(cov_window_, {T_new_old.q, {}, 1.0});
+  cov_passing_ = rotated(cov_passing_, {T_new_old.q, {}, 1.0});
 }
 
 template <class Mapping, class Archive>
 void LocalMapping::members(Mapping& self, Archive& archive) {
-  archive(self.map_, self.begun_us_, self.cov_own_, self.cov_window_, self.scale_, self.scale_std_);
+  archive(self.map_, self.begun_us_, self.cov_own_, self.cov_passing_, self.scale_, self.scale_std_);
 }
 
 void LocalMapping::save(StateWriter& writer) const {

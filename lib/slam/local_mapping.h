@@ -20,7 +20,7 @@ namespace roadfix {
 /// What an adjustment has changed.
 struct MapAdjustment {
   std::vector<int64_t> outliers;             ///< tracks, ascending, no longer in the map
-  Matrix6d cov_keyframe = Matrix6d::Zero();  ///< that the newest keyframe adds, (S.9.1)
+  Matrix6d cov_keyframe = Matrix6d::Zero();  ///< that a keyframe adds, of the newest one's pose, (S.9.1)
   double scale_drift = 0.0;                  ///< variance of the logarithm of the scale that it adds, (S.10.2)
 };
 
@@ -72,11 +72,11 @@ class LocalMapping {
   [[nodiscard]] bool stereo() const { return matcher_ != nullptr; }
   [[nodiscard]] bool mono_with_scale() const { return !stereo() && scale_ != ScaleSource::kNone; }
   [[nodiscard]] ScaleSource scale_source() const { return stereo() ? ScaleSource::kStereo : scale_; }
-  /// Errors common to all lengths and all rotations. Monocular rotations: of the estimated focal length, (S.8.2).
+  /// Of errors that all poses share. Monocular rotations: of the estimated focal length, (S.8.2).
   [[nodiscard]] ScaleSigmas scale_sigmas() const;
-  /// Of the last keyframe's pose: the share that this map has added, and that relative to the fixed keyframes, (S.9.2).
+  /// Of the last keyframe's pose: what this map has added, (S.9.1), and what it has wrong that does not add up, (S.11.1).
   [[nodiscard]] const Matrix6d& cov_own() const { return cov_own_; }
-  [[nodiscard]] const Matrix6d& cov_window() const { return cov_window_; }
+  [[nodiscard]] const Matrix6d& cov_passing() const { return cov_passing_; }
 
   /// `distance` as it was saved with this.
   void save(StateWriter& writer) const;
@@ -96,6 +96,7 @@ class LocalMapping {
 
   CameraRig rig_;
   int bundle_iterations_;
+  double drift_;
   Camera left_, right_;
   std::unique_ptr<RightImageMatcher> matcher_;  ///< null without a right camera
   Executor& executor_;
@@ -103,7 +104,7 @@ class LocalMapping {
   std::unique_ptr<BundleJob> job_;
   int64_t begun_us_ = 0;
   Matrix6d cov_own_ = Matrix6d::Zero();
-  Matrix6d cov_window_ = Matrix6d::Zero();
+  Matrix6d cov_passing_ = Matrix6d::Zero();
   ScaleSource scale_ = ScaleSource::kNone;  ///< of a monocular map
   double scale_std_ = 0.0;
 };

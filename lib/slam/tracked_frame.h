@@ -9,7 +9,7 @@
 #include "features/front_end.h"
 #include "samples/samples.h"
 #include "slam/config.h"
-#include "slam/considered_scales.h"
+#include "slam/considered_errors.h"
 
 namespace roadfix {
 
@@ -37,10 +37,10 @@ struct TrackedFrame {
   std::string reason;        ///< text for the operator, empty when good
   ScaleSource scale = ScaleSource::kNone;
   double scale_std = 0.0;  ///< relative, common to the whole trajectory; undefined where the source is none
-  /// Error of the pose per sigma of the common scales; its square is contained in the covariances.
-  ScaleSensitivity scale_sensitivity = ScaleSensitivity::Zero();
-  /// Errors that do not accumulate (S.11.1), in the order and axes of the pose covariance.
-  Matrix6d cov_image = Matrix6d::Zero();   ///< of this image alone; contained in cov_pose
+  /// Error of the pose per sigma of what the trajectory shares; its square is contained in the covariances.
+  ConsideredColumns considered = ConsideredColumns::Zero();
+  /// Errors that do not accumulate (S.11.1), in the order and axes of cov_pose, which contains them.
+  Matrix6d cov_image = Matrix6d::Zero();   ///< of this image alone
   Matrix6d cov_map = Matrix6d::Zero();     ///< of the local map that the image is matched to,
   double map_time = 0.0;                   ///< s, duration of that map
   int reset_counter = 0;                   ///< +1 per jump of the pose
@@ -70,7 +70,7 @@ struct TrackedFrame {
     auto& o = self.odometry;
     archive(o.t_us, o.T_frame_vehicle, o.velocity, o.angular_rate, o.cov_pose, o.cov_velocity, o.validity);
     archive(self.state, self.reason, self.reset_counter, self.reset_delta, self.cov_closed, self.closed_reset_counter,
-            self.closed_reset_delta, self.scale_sensitivity, self.cov_image, self.cov_map, self.map_time);
+            self.closed_reset_delta, self.considered, self.cov_image, self.cov_map, self.map_time);
   }
 };
 

@@ -12,18 +12,19 @@ void VehicleOdometry::set_pose(CameraState& camera, const LocalMapping& mapping,
   const SE3 T_keyframe_now = T_map_keyframe.inverse() * T_map_camera;
   const bool metric = mapping.scale_source() != ScaleSource::kNone;
   const ScaleErrors errors{mapping.scale_sigmas(), metric ? Eigen::Vector3d::Zero() : T_camera_vehicle_.p};
-  const Matrix6d cov = camera.covariance.at_image(T_map_keyframe, T_keyframe_now, T_map_camera, errors, cov_image);
+  const Matrix6d cov_map = transported(mapping.cov_passing(), T_map_keyframe, T_keyframe_now);
+  const Matrix6d passing = cov_image + cov_map;
+  const Matrix6d cov = camera.covariance.at_image(T_map_keyframe, T_keyframe_now, T_map_camera, errors, passing);
   out.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle_;
   out.odometry.cov_pose = transported(cov, T_map_camera, T_camera_vehicle_);
-  out.scale_sensitivity =
-      pose_transport_jacobian(T_map_camera, T_camera_vehicle_) * camera.covariance.scales().columns();
+  out.considered = pose_transport_jacobian(T_map_camera, T_camera_vehicle_) * camera.covariance.scales().columns();
   out.cov_image = transported(cov_image, T_map_camera, T_camera_vehicle_);
-  out.cov_map = transported(mapping.cov_window(), T_map_keyframe, T_keyframe_now * T_camera_vehicle_);
+  out.cov_map = transported(cov_map, T_map_camera, T_camera_vehicle_);
   out.map_time = seconds_between(mapping.map().last_fixed_us(), out.odometry.t_us);
   const SE3 T_closed_keyframe = loops.S_map_odom().rigid() * T_map_keyframe;
   const SE3 T_closed_camera = loops.closed(T_map_camera);
   const Matrix6d cov_closed = loops.covariance().at_image(T_closed_keyframe, T_keyframe_now, T_closed_camera, errors,
-                                                          rotated(cov_image, loops.S_map_odom()));
+                                                          rotated(passing, loops.S_map_odom()));
   out.cov_closed = transported(cov_closed, T_closed_camera, T_camera_vehicle_);
 }
 
@@ -53,12 +54,12 @@ void VehicleOdometry::set_velocities(const FrameMotion& motion, const Eigen::Mat
   odometry.cov_velocity = cov_velocity + shared * shared.transpose();
 }
 
-ScaleSensitivity VehicleOdometry::sensitivity_at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
+ConsideredColumns VehicleOdometry::considered_at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
                                                  const VelocityPrior& velocity, const ScaleSigmas& sigmas) const {
   const bool valid = last.odometry.validity != Validity::kInvalid;
-  if (!camera.t_us || t_us == *camera.t_us || !valid) return last.scale_sensitivity;
+  if (!camera.t_us || t_us == *camera.t_us || !valid) return last.considered;
   const SE3 T_predicted = camera.predict(velocity, t_us);
-  ConsideredScales scales = camera.covariance.scales();
+  ConsideredErrors scales = camera.covariance.scales();
   scales.propagate_to(T_predicted, sigmas);
   return pose_transport_jacobian(T_predicted, T_camera_vehicle_) * scales.columns();
 }
@@ -74,8 +75,8 @@ Odometry VehicleOdometry::at(int64_t t_us, const TrackedFrame& last, const Camer
   o.cov_pose.topLeftCorner<3, 3>() +=
       dt_s * dt_s * o.T_frame_vehicle.R() * o.cov_velocity * o.T_frame_vehicle.R().transpose();
   o.cov_pose.topLeftCorner<3, 3>().diagonal().array() += slip * slip;
-  const ScaleSensitivity shared = sensitivity_at(t_us, last, camera, velocity, sigmas);
-  o.cov_pose += shared * shared.transpose() - last.scale_sensitivity * last.scale_sensitivity.transpose();
+  const ConsideredColumns shared = considered_at(t_us, last, camera, velocity, sigmas);
+  o.cov_pose += shared * shared.transpose() - last.considered * last.considered.transpose();
   return o;
 }
 

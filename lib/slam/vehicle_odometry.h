@@ -31,7 +31,7 @@ class VehicleOdometry {
   [[nodiscard]] Odometry at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
                             const VelocityPrior& velocity, const ScaleSigmas& sigmas) const;
   /// Scale sensitivity of that pose.
-  [[nodiscard]] ScaleSensitivity sensitivity_at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
+  [[nodiscard]] ConsideredColumns considered_at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
                                                 const VelocityPrior& velocity, const ScaleSigmas& sigmas) const;
 
  private:

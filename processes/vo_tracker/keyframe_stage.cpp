@@ -43,7 +43,7 @@ KeyframeStage::KeyframeStage(const Calibration& calibration, const VoTrackerConf
       std::make_unique<KeyframeTracker>(with_lens_of(calibration, config.keyframe), camera_rig(calibration),
                                         make_front_end(config.keyframe.front_end, superpoint_weights), *executor_);
   spec_.name = "vo_tracker";
-  spec_.state_layout = 12;
+  spec_.state_layout = 13;
   spec_.inputs = {{"CAMERA_LEFT", "image_t", 0, 0}};
   if (stereo_) spec_.inputs.push_back({"CAMERA_RIGHT", "image_t", 0, 0});
   const auto add = [this](const char* channel, const char* type, int64_t delay_us) {
@@ -107,7 +107,7 @@ void KeyframeStage::publish(int64_t now_utime, Outputs& outputs) {
   map_started_ = tracked_ && frame.map_started;
   if (!tracked_) return;  // a tick without a left image: only an extrapolated pose
   tracked_ = false;
-  vo_status_t status = vo_status(frame, tracker_->scale_sensitivity_at(now_utime), config_.keyframe.front_end.kind);
+  vo_status_t status = vo_status(frame, tracker_->considered_at(now_utime), config_.keyframe.front_end.kind);
   outputs.publish(kStatus, status);
   vo_features2_t features = vo_features(frame);
   outputs.publish(kFeatures, features);

@@ -85,7 +85,7 @@ const char* name_of(FrontEndKind kind) {
   return "klt";
 }
 
-vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end) {
+vo_status_t vo_status(const TrackedFrame& frame, const ConsideredColumns& shared, FrontEndKind front_end) {
   vo_status_t m{};
   m.mode = vo_status_t::MODE_KEYFRAME;
   m.state = static_cast<int8_t>(frame.state);
@@ -94,7 +94,7 @@ vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared,
   m.scale_source = static_cast<int8_t>(frame.scale);
   m.scale_std = frame.scale_std;
   for (int i = 0; i < shared.rows(); ++i)
-    for (int j = 0; j < shared.cols(); ++j) m.shared_error_m_rad[j][i] = shared(i, j);
+    for (int j = 0; j < 2; ++j) m.shared_error_m_rad[j][i] = shared(i, j);
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) {
       m.cov_picture_m2_rad2[i][j] = frame.cov_image(i, j);

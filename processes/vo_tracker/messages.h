@@ -20,7 +20,7 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
 const char* name_of(FrontEndKind kind);
 
 /// `shared`: scale sensitivity of the pose published beside it.
-vo_status_t vo_status(const TrackedFrame& frame, const ScaleSensitivity& shared, FrontEndKind front_end);
+vo_status_t vo_status(const TrackedFrame& frame, const ConsideredColumns& shared, FrontEndKind front_end);
 /// Of mode `filter`.
 vo_status_t filter_status(const navigation::NavigationOutput& output, const navigation::Navigation& filter,
                           bool two_eyes);

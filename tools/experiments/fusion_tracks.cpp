@@ -88,7 +88,7 @@ class TracksStage final : public Stage {
     const TrackedFrame& frame = tracker_->last();
     pose_t pose = vo_pose(frame, tracker_->at(now_utime), calibration_.body_origin.value_or(BodyOrigin::kImu));
     outputs.publish(0, pose);
-    vo_status_t status = vo_status(frame, tracker_->scale_sensitivity_at(now_utime), FrontEndKind::kKlt);
+    vo_status_t status = vo_status(frame, tracker_->considered_at(now_utime), FrontEndKind::kKlt);
     outputs.publish(1, status);
   }
   void digest(Digest& digest) const override { tracker_->digest(digest); }

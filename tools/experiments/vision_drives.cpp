@@ -78,7 +78,7 @@ struct Stamped {
   int reset = 0;  ///< counter
   SE3 T_found, T_true, T_closed;
   Matrix6d cov, image, map;
-  ScaleSensitivity scales;
+  ConsideredColumns considered;
 };
 
 struct Loss {
@@ -88,7 +88,7 @@ struct Loss {
 };
 
 /// The motion between two poses against the true one. Its covariance: what is added between the two, what does not
-/// accumulate, at both, and the common scales, which are the same at both (S.10.1).
+/// accumulate, at both, and what the whole trajectory shares, (S.10.1) and (S.10.4).
 Loss loss(const Stamped& a, const Stamped& b) {
   const SE3 found = a.T_found.inverse() * b.T_found, truth = a.T_true.inverse() * b.T_true;
   Loss l;
@@ -96,14 +96,16 @@ Loss loss(const Stamped& a, const Stamped& b) {
   l.error.tail<3>() = log_q(found.q * truth.q.conjugate());
   const Eigen::Matrix3d R = a.T_found.R();
   const Matrix6d F = pose_transport_jacobian(a.T_found, found);
-  const auto without_scales = [](const Stamped& s) -> Matrix6d { return s.cov - s.scales * s.scales.transpose(); };
-  const ScaleSensitivity scales = b.scales - F * a.scales;
+  const auto added = [](const Stamped& s) -> Matrix6d {
+    return s.cov - s.image - s.map - s.considered * s.considered.transpose();
+  };
+  const ConsideredColumns shared = b.considered - F * a.considered;
   // A difference of large covariances: what rounding and adjustments since leave negative of it is nothing.
-  const Matrix6d grown = without_scales(b) - b.image - F * (without_scales(a) - a.image) * F.transpose();
+  const Matrix6d grown = added(b) - F * added(a) * F.transpose();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (grown + grown.transpose()));
   const Matrix6d P =
       eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose() +
-      b.image + b.map + scales * scales.transpose() + F * (a.image + a.map) * F.transpose();
+      b.image + b.map + shared * shared.transpose() + F * (a.image + a.map) * F.transpose();
   const Eigen::Matrix3d place = R.transpose() * P.topLeftCorner<3, 3>() * R;
   const Eigen::Matrix3d turn = found.R() * P.bottomRightCorner<3, 3>() * found.R().transpose();
   const Eigen::Vector3d p = l.error.head<3>(), r = l.error.tail<3>();
@@ -135,7 +137,7 @@ class Run {
     if (out.odometry.validity != Validity::kValid) return;
     poses.push_back({t_us, out.reset_counter, out.odometry.T_frame_vehicle, drive_.truth_at(t_us).T_frame_vehicle,
                      tracker_.closed(out.odometry).T_frame_vehicle, out.odometry.cov_pose, out.cov_image, out.cov_map,
-                     out.scale_sensitivity});
+                     out.considered});
     resets = out.reset_counter;
     loops = out.num_loops;
   }

@@ -121,7 +121,9 @@ TEST_CASE("a transformed map keeps its own accumulated covariance") {
   while ((*drive).last().odometry.validity != Validity::kValid) (void)drive.frame(i++);
   const int begun = i - 1;
   while (i < 10) (void)drive.frame(i++);
-  const auto of_the_map = [](const TrackedFrame& out) -> Matrix6d { return out.odometry.cov_pose - out.cov_image; };
+  const auto of_the_map = [](const TrackedFrame& out) -> Matrix6d {
+    return out.odometry.cov_pose - out.cov_image - out.cov_map;
+  };
   const Matrix6d own = of_the_map((*drive).last());
   const double sigma = 1e-6;
   (*drive).restart({time_of(begun),

@@ -1,4 +1,4 @@
-#include "slam/considered_scales.h"
+#include "slam/considered_errors.h"
 
 #include "geometry/so3.h"
 #include "slam/pose_covariance.h"
@@ -6,11 +6,13 @@
 namespace roadfix {
 namespace {
 
+constexpr int kTurnX = 3, kTurnZ = 5;  // rows of a rotation about the camera's axes
+
 constexpr double kUnitStd = 1.0;  ///< of the logarithm of an unknown unit
 
 }  // namespace
 
-void ConsideredScales::start_at(const SE3& T_map_camera) {
+void ConsideredErrors::start_at(const SE3& T_map_camera) {
   begun_ = true;
   T_map_camera_ = T_map_camera;
   columns_.setZero();
@@ -19,24 +21,27 @@ void ConsideredScales::start_at(const SE3& T_map_camera) {
   reset_scale_drift();
 }
 
-Matrix6d ConsideredScales::cov() const {
+Matrix6d ConsideredErrors::cov() const {
   Matrix6d cov = columns_ * columns_.transpose() + cov_drift_;
   cov.topLeftCorner<3, 3>() += kUnitStd * kUnitStd * lever_ * lever_.transpose();
   return cov;
 }
 
-void ConsideredScales::reset_scale_drift() {
+void ConsideredErrors::reset_scale_drift() {
   cov_drift_scale_.setZero();
   cov_scale_ = 0.0;
 }
 
-void ConsideredScales::propagate_to(const SE3& T_map_camera, const ScaleSigmas& sigmas, const Eigen::Vector3d& lever) {
+void ConsideredErrors::propagate_to(const SE3& T_map_camera, const ScaleSigmas& sigmas, const Eigen::Vector3d& lever) {
   if (!begun_) return start_at(T_map_camera);
   const SE3 T_before_now = T_map_camera_.inverse() * T_map_camera;
   const Matrix6d F = pose_transport_jacobian(T_map_camera_, T_before_now);
   columns_ = F * columns_;
   columns_.col(0).head<3>() += sigmas.length * (T_map_camera.p - T_map_camera_.p);
   columns_.col(1).tail<3>() += sigmas.rotation * log_q(T_before_now.q);
+  const double turn = sigmas.drift * T_before_now.p.norm();
+  columns_(kTurnX, 2) += turn;
+  columns_(kTurnZ, 3) += turn;
   Vector6d step = Vector6d::Zero();
   step.head<3>() = T_map_camera.p - T_map_camera_.p;
   cov_drift_scale_ = (F * cov_drift_scale_).eval();
@@ -48,7 +53,7 @@ void ConsideredScales::propagate_to(const SE3& T_map_camera, const ScaleSigmas& 
   T_map_camera_ = T_map_camera;
 }
 
-void ConsideredScales::move(const SE3& T_new_old) {
+void ConsideredErrors::move(const SE3& T_new_old) {
   T_map_camera_ = T_new_old * T_map_camera_;
   Matrix6d turned = Matrix6d::Identity();
   turned.topLeftCorner<3, 3>() = T_new_old.R();

@@ -1,6 +1,6 @@
-/// Scale errors common to all lengths and all rotations of a trajectory, from calibration or speeds: not observable in
-/// images, considered but not estimated (Schmidt). MODEL.md (S.10.1). And the scale drift of a monocular map without
-/// speeds, (S.10.2).
+/// Errors that a whole trajectory shares and images do not show, considered but not estimated (Schmidt): the scale of all
+/// lengths and of all rotations, from calibration or speeds, (S.10.1) of MODEL.md; a slow turn that the tracks of a scene
+/// pretend together, (S.10.4); and the scale drift of a monocular map without speeds, (S.10.2).
 #pragma once
 
 #include <Eigen/Dense>
@@ -9,18 +9,18 @@
 
 namespace roadfix {
 
-/// Relative sigmas.
 struct ScaleSigmas {
-  double length = 0.0;
-  double rotation = 0.0;
+  double length = 0.0;    ///< relative
+  double rotation = 0.0;  ///< relative
+  double drift = 0.0;     ///< rad/m, of a turn that all tracks pretend
 };
 
-/// Error of a pose per sigma, one column for lengths and one for rotations. Order: position in the map, rotation in the
-/// pose's axes.
-using ScaleSensitivity = Eigen::Matrix<double, 6, 2>;
+/// Error of a pose per sigma: a column for lengths, one for rotations, and those of a pretended turn about the camera's x
+/// and z. Order: position in the map, rotation in the pose's axes.
+using ConsideredColumns = Eigen::Matrix<double, 6, 4>;
 
 /// Propagates these errors along the trajectory. A jump counts as motion: the common scale applies to it as well.
-class ConsideredScales {
+class ConsideredErrors {
  public:
   /// Restarts at a pose given from outside, which has none of the error accumulated so far.
   void start_at(const SE3& T_map_camera);
@@ -35,7 +35,7 @@ class ConsideredScales {
   /// Applies a transform of the map's axes.
   void move(const SE3& T_new_old);
 
-  [[nodiscard]] const ScaleSensitivity& columns() const { return columns_; }
+  [[nodiscard]] const ConsideredColumns& columns() const { return columns_; }
   /// Of the camera; of the vehicle after transport to it.
   [[nodiscard]] Matrix6d cov() const;
 
@@ -48,7 +48,7 @@ class ConsideredScales {
  private:
   bool begun_ = false;
   SE3 T_map_camera_;
-  ScaleSensitivity columns_ = ScaleSensitivity::Zero();
+  ConsideredColumns columns_ = ConsideredColumns::Zero();
   Matrix6d cov_drift_ = Matrix6d::Zero();            ///< of the pose, due to scale drift
   Vector6d cov_drift_scale_ = Vector6d::Zero();      ///< cross covariance with the scale
   double cov_scale_ = 0.0;                           ///< of the logarithm of the scale

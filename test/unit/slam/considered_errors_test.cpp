@@ -1,4 +1,4 @@
-#include "slam/considered_scales.h"
+#include "slam/considered_errors.h"
 
 #include <catch2/catch.hpp>
 #include <random>
@@ -23,7 +23,7 @@ SE3 after(int steps) {
 TEST_CASE("the scale drift covariance is consistent with the position error") {
   constexpr int kDraws = 400;
   const auto claimed = [](double lost) {
-    ConsideredScales error;
+    ConsideredErrors error;
     for (int i = 0; i <= kSteps; ++i) {
       error.propagate_to(after(i), {});
       error.add_scale_drift(lost);
@@ -52,7 +52,7 @@ TEST_CASE("the scale drift covariance is consistent with the position error") {
 
 TEST_CASE("a transformed map has the same error in its new axes, one with a new start has none") {
   const Eigen::Vector3d lever(0.0, 1.5, -1.6);
-  ConsideredScales error, moved;
+  ConsideredErrors error, moved;
   const SE3 turn{exp_q({0.1, 0.7, -0.2}), {3.0, 0.0, 1.0}};
   for (int i = 0; i <= kSteps; ++i) {
     error.propagate_to(after(i), {0.01, 0.003}, lever);
@@ -69,9 +69,30 @@ TEST_CASE("a transformed map has the same error in its new axes, one with a new 
   CHECK(moved.cov().isZero(0.0));
 }
 
+TEST_CASE("a turn that tracks pretend grows with the way, about the camera's x and z") {
+  constexpr double kDrift = 1.0e-6;
+  ConsideredErrors error;
+  SE3 straight, pretended[2];
+  error.propagate_to(straight, {});
+  for (int i = 1; i <= kSteps; ++i) {
+    const SE3 step = after(i - 1).inverse() * after(i);
+    straight = straight * step;
+    error.propagate_to(straight, {0.0, 0.0, kDrift});
+    for (int k = 0; k < 2; ++k) {
+      pretended[k] = pretended[k] * step * SE3{exp_q(kDrift * Eigen::Vector3d::Unit(2 * k)), Eigen::Vector3d::Zero()};
+    }
+  }
+  CHECK(error.columns().leftCols<2>().isZero(0.0));
+  for (int k = 0; k < 2; ++k) {
+    const Vector6d e = local(straight, pretended[k]);
+    CHECK((error.columns().col(2 + k) - e).norm() < 1e-3 * e.norm());
+    CHECK((error.columns().col(3 - k) - e).norm() > 0.5 * e.norm());  // teeth
+  }
+}
+
 TEST_CASE("a lever arm in an unknown unit moves the vehicle when it rotates") {
   const Eigen::Vector3d lever(0.0, 1.5, -1.6);
-  ConsideredScales straight, bend, known;
+  ConsideredErrors straight, bend, known;
   for (int i = 0; i <= kSteps; ++i) {
     straight.propagate_to({Eigen::Quaterniond::Identity(), i * Eigen::Vector3d::UnitZ()}, {}, lever);
     bend.propagate_to(after(i), {}, lever);
