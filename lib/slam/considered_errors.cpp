@@ -6,8 +6,6 @@
 namespace roadfix {
 namespace {
 
-constexpr int kTurnX = 3, kTurnZ = 5;  // rows of a rotation about the camera's axes
-
 constexpr double kUnitStd = 1.0;  ///< of the logarithm of an unknown unit
 
 }  // namespace
@@ -40,8 +38,8 @@ void ConsideredErrors::propagate_to(const SE3& T_map_camera, const ScaleSigmas& 
   columns_.col(0).head<3>() += sigmas.length * (T_map_camera.p - T_map_camera_.p);
   columns_.col(1).tail<3>() += sigmas.rotation * log_q(T_before_now.q);
   const double turn = sigmas.drift * T_before_now.p.norm();
-  columns_(kTurnX, 2) += turn;
-  columns_(kTurnZ, 3) += turn;
+  columns_.col(2).tail<3>().x() += turn;
+  columns_.col(3).tail<3>().z() += turn;
   Vector6d step = Vector6d::Zero();
   step.head<3>() = T_map_camera.p - T_map_camera_.p;
   cov_drift_scale_ = (F * cov_drift_scale_).eval();
