@@ -29,6 +29,17 @@ struct InitialisationStep {
   bool is_first = false;          ///< this is the first image
 };
 
+/// The first of the two.
+struct FirstImage {
+  int64_t t_us = 0;
+  std::map<int64_t, Eigen::Vector2d> seen;  ///< normalised, by track
+
+  template <class Self, class Archive>
+  static void members(Self& self, Archive& archive) {
+    archive(self.t_us, self.seen);
+  }
+};
+
 class Initialiser {
  public:
   Initialiser(const KeyframeTrackerConfig& config, const Camera& camera, const Eigen::Quaterniond& q_camera_vehicle)
@@ -53,16 +64,6 @@ class Initialiser {
   }
 
  private:
-  struct FirstImage {
-    int64_t t_us = 0;
-    std::map<int64_t, Eigen::Vector2d> seen;  ///< normalised, by track
-
-    template <class Self, class Archive>
-    static void members(Self& self, Archive& archive) {
-      archive(self.t_us, self.seen);
-    }
-  };
-
   /// Tracks in the first image and in this one, in ascending order of track.
   struct CommonTracks {
     std::vector<Feature> now;
