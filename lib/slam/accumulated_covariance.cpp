@@ -5,7 +5,7 @@
 namespace roadfix {
 
 void AccumulatedCovariance::start_at(const SE3& T_map_camera, const Matrix6d& keyframe) {
-  scales_.start_at(T_map_camera);
+  considered_.start_at(T_map_camera);
   keyframe_ = keyframe;
 }
 
@@ -15,7 +15,7 @@ void AccumulatedCovariance::propagate(const SE3& T_map_keyframe, const SE3& T_ke
 
 void AccumulatedCovariance::add(const Matrix6d& keyframe, double scale_drift) {
   keyframe_ += keyframe;
-  scales_.add_scale_drift(scale_drift);
+  considered_.add_scale_drift(scale_drift);
 }
 
 void AccumulatedCovariance::add(const UnseenMotion& unseen, const Eigen::Vector3d& up) {
@@ -26,13 +26,13 @@ void AccumulatedCovariance::add(const UnseenMotion& unseen, const Eigen::Vector3
 
 void AccumulatedCovariance::level(const LevellingRotation& levelling, const SE3& T_map_keyframe) {
   keyframe_ = levelling.covariance(keyframe_, T_map_keyframe);
-  scales_.move(levelling.transform());
+  considered_.move(levelling.transform());
 }
 
 Matrix6d AccumulatedCovariance::at_image(const SE3& T_map_keyframe, const SE3& T_keyframe_now, const SE3& T_map_now,
                                          const ScaleErrors& errors, const Matrix6d& image) {
-  scales_.propagate_to(T_map_now, errors.sigmas, errors.lever);
-  return transported(keyframe_, T_map_keyframe, T_keyframe_now) + image + scales_.cov();
+  considered_.propagate_to(T_map_now, errors.sigmas, errors.lever);
+  return transported(keyframe_, T_map_keyframe, T_keyframe_now) + image + considered_.cov();
 }
 
 }  // namespace roadfix

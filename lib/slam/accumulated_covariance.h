@@ -26,7 +26,7 @@ class AccumulatedCovariance {
   /// Motion without images; `up`: the vehicle's z in camera axes.
   void add(const UnseenMotion& unseen, const Eigen::Vector3d& up);
   /// The scale is measured from here on.
-  void reset_scale_drift() { scales_.reset_scale_drift(); }
+  void reset_scale_drift() { considered_.reset_scale_drift(); }
   /// Levels the map, in which T_map_keyframe is the new pose of the last keyframe.
   void level(const LevellingRotation& levelling, const SE3& T_map_keyframe);
 
@@ -34,18 +34,18 @@ class AccumulatedCovariance {
   [[nodiscard]] Matrix6d at_image(const SE3& T_map_keyframe, const SE3& T_keyframe_now, const SE3& T_map_now,
                                   const ScaleErrors& errors, const Matrix6d& image);
   /// Of the last keyframe, with the scale errors of the last image.
-  [[nodiscard]] Matrix6d with_scales() const { return keyframe_ + scales_.cov(); }
+  [[nodiscard]] Matrix6d with_considered() const { return keyframe_ + considered_.cov(); }
   [[nodiscard]] const Matrix6d& keyframe() const { return keyframe_; }
-  [[nodiscard]] const ConsideredErrors& scales() const { return scales_; }
+  [[nodiscard]] const ConsideredErrors& considered() const { return considered_; }
 
   template <class Self, class Archive>
   static void members(Self& self, Archive& archive) {
-    archive(self.keyframe_, self.scales_);
+    archive(self.keyframe_, self.considered_);
   }
 
  private:
   Matrix6d keyframe_ = Matrix6d::Zero();
-  ConsideredErrors scales_;
+  ConsideredErrors considered_;
 };
 
 }  // namespace roadfix

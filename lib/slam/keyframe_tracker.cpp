@@ -368,7 +368,7 @@ void KeyframeTracker::digest(Digest& digest) const {
   digest.add(camera_.T_map_camera.q.coeffs());
   digest.add(camera_.T_map_camera.p);
   digest.add(camera_.covariance.keyframe());
-  digest.add(camera_.covariance.scales().columns());
+  digest.add(camera_.covariance.considered().columns());
   digest.add(loops_.S_map_odom().p);
   digest.add(loops_.S_map_odom().q.coeffs());
   digest.add(lens().value);

@@ -51,7 +51,7 @@ class KeyframeTracker {
   [[nodiscard]] const TrackedFrame& last() const { return out_; }
   /// Last pose extrapolated to another time with the last motion; invalid beyond the time limit.
   [[nodiscard]] Odometry at(int64_t t_us) const;
-  /// Scale sensitivity of that pose.
+  /// What that pose shares with the whole trajectory, (S.10.1), (S.10.4).
   [[nodiscard]] ConsideredColumns considered_at(int64_t t_us) const;
   /// The same pose with all loops closed.
   [[nodiscard]] Odometry closed(Odometry odometry) const;

@@ -54,7 +54,7 @@ PlaceView LoopClosing::view(const cv::Mat& gray, std::span<const Feature> featur
   DescribedCorners described = describe_corners(gray, pixels);
   PlaceView view;
   view.T_odom_camera = T_map_camera;
-  view.cov = covariance_.with_scales();
+  view.cov = covariance_.with_considered();
   view.step = step_;
   const SE3 T_camera_map = T_map_camera.inverse();
   for (size_t row = 0; row < described.index.size(); ++row) {

@@ -17,7 +17,7 @@ void VehicleOdometry::set_pose(CameraState& camera, const LocalMapping& mapping,
   const Matrix6d cov = camera.covariance.at_image(T_map_keyframe, T_keyframe_now, T_map_camera, errors, passing);
   out.odometry.T_frame_vehicle = T_map_camera * T_camera_vehicle_;
   out.odometry.cov_pose = transported(cov, T_map_camera, T_camera_vehicle_);
-  out.considered = pose_transport_jacobian(T_map_camera, T_camera_vehicle_) * camera.covariance.scales().columns();
+  out.considered = pose_transport_jacobian(T_map_camera, T_camera_vehicle_) * camera.covariance.considered().columns();
   out.cov_image = transported(cov_image, T_map_camera, T_camera_vehicle_);
   out.cov_map = transported(cov_map, T_map_camera, T_camera_vehicle_);
   out.map_time = seconds_between(mapping.map().last_fixed_us(), out.odometry.t_us);
@@ -59,9 +59,9 @@ ConsideredColumns VehicleOdometry::considered_at(int64_t t_us, const TrackedFram
   const bool valid = last.odometry.validity != Validity::kInvalid;
   if (!camera.t_us || t_us == *camera.t_us || !valid) return last.considered;
   const SE3 T_predicted = camera.predict(velocity, t_us);
-  ConsideredErrors scales = camera.covariance.scales();
-  scales.propagate_to(T_predicted, sigmas);
-  return pose_transport_jacobian(T_predicted, T_camera_vehicle_) * scales.columns();
+  ConsideredErrors shared = camera.covariance.considered();
+  shared.propagate_to(T_predicted, sigmas);
+  return pose_transport_jacobian(T_predicted, T_camera_vehicle_) * shared.columns();
 }
 
 Odometry VehicleOdometry::at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,

@@ -30,7 +30,7 @@ class VehicleOdometry {
   /// The pose of the last frame extrapolated to another time, where it is valid.
   [[nodiscard]] Odometry at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
                             const VelocityPrior& velocity, const ScaleSigmas& sigmas) const;
-  /// Scale sensitivity of that pose.
+  /// What that pose shares with the whole trajectory.
   [[nodiscard]] ConsideredColumns considered_at(int64_t t_us, const TrackedFrame& last, const CameraState& camera,
                                                 const VelocityPrior& velocity, const ScaleSigmas& sigmas) const;
 

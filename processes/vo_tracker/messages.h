@@ -19,7 +19,7 @@ pose_t vo_closed_pose(const TrackedFrame& frame, const Odometry& closed, BodyOri
 /// As in the configuration and in VO_STATUS.
 const char* name_of(FrontEndKind kind);
 
-/// `shared`: scale sensitivity of the pose published beside it.
+/// `shared`: of the pose published beside it; the message has the columns of the scales.
 vo_status_t vo_status(const TrackedFrame& frame, const ConsideredColumns& shared, FrontEndKind front_end);
 /// Of mode `filter`.
 vo_status_t filter_status(const navigation::NavigationOutput& output, const navigation::Navigation& filter,

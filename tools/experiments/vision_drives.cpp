@@ -18,16 +18,15 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/alignment.h"
 #include "features/front_end.h"
 #include "geometry/determinism.h"
-#include "geometry/so3.h"
 #include "program.h"
+#include "relative_motion.h"
+#include "second_lap.h"
 #include "setter.h"
 #include "simulation/scenarios.h"
 #include "simulation/scene/film.h"
 #include "slam/keyframe_tracker.h"
-#include "slam/pose_covariance.h"
 #include "stream/executor.h"
 
 namespace roadfix {
@@ -72,48 +71,6 @@ class WithoutLens final : public FrontEnd {
  private:
   std::unique_ptr<FrontEnd> inner_;
 };
-
-struct Stamped {
-  int64_t t_us = 0;
-  int reset = 0;  ///< counter
-  SE3 T_found, T_true, T_closed;
-  Matrix6d cov, image, map;
-  ConsideredColumns considered;
-};
-
-struct Loss {
-  Vector6d error = Vector6d::Zero();     ///< place, then rotation; axes of the first pose
-  Vector6d variance = Vector6d::Zero();  ///< claimed, in the same axes
-  double nees_place = 0.0, nees_turn = 0.0;
-};
-
-/// The motion between two poses against the true one. Its covariance: what is added between the two, what does not
-/// accumulate, at both, and what the whole trajectory shares, (S.10.1) and (S.10.4).
-Loss loss(const Stamped& a, const Stamped& b) {
-  const SE3 found = a.T_found.inverse() * b.T_found, truth = a.T_true.inverse() * b.T_true;
-  Loss l;
-  l.error.head<3>() = found.p - truth.p;
-  l.error.tail<3>() = log_q(found.q * truth.q.conjugate());
-  const Eigen::Matrix3d R = a.T_found.R();
-  const Matrix6d F = pose_transport_jacobian(a.T_found, found);
-  const auto added = [](const Stamped& s) -> Matrix6d {
-    return s.cov - s.image - s.map - s.considered * s.considered.transpose();
-  };
-  const ConsideredColumns shared = b.considered - F * a.considered;
-  // A difference of large covariances: what rounding and adjustments since leave negative of it is nothing.
-  const Matrix6d grown = added(b) - F * added(a) * F.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (grown + grown.transpose()));
-  const Matrix6d P =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose() +
-      b.image + b.map + shared * shared.transpose() + F * (a.image + a.map) * F.transpose();
-  const Eigen::Matrix3d place = R.transpose() * P.topLeftCorner<3, 3>() * R;
-  const Eigen::Matrix3d turn = found.R() * P.bottomRightCorner<3, 3>() * found.R().transpose();
-  const Eigen::Vector3d p = l.error.head<3>(), r = l.error.tail<3>();
-  l.variance << place.diagonal(), turn.diagonal();
-  l.nees_place = p.dot(place.ldlt().solve(p)) / 3.0;
-  l.nees_turn = r.dot(turn.ldlt().solve(r)) / 3.0;
-  return l;
-}
 
 class Run {
  public:
@@ -178,50 +135,6 @@ cv::Mat as_sent(const GrayImage& picture, int quality) {
   return cv::imdecode(file, cv::IMREAD_GRAYSCALE);
 }
 
-/// Index of the pose at which the second lap begins: back near where the first one led away; the number of poses without one.
-size_t second_lap(const std::vector<Stamped>& poses) {
-  constexpr int64_t kOnTheWay_us = 10'000'000;
-  constexpr double kNear = 5.0, kAway = 50.0;  // m
-  size_t begin = 0;
-  while (begin < poses.size() && poses[begin].t_us - poses.front().t_us < kOnTheWay_us) ++begin;
-  bool away = false;
-  for (size_t i = begin; i < poses.size(); ++i) {
-    const double distance = (poses[i].T_true.p - poses[begin].T_true.p).head<2>().norm();
-    away = away || distance > kAway;
-    if (away && distance < kNear) return i;
-  }
-  return poses.size();
-}
-
-/// Sum of squared horizontal errors from the pose `first` on: all of them aligned in yaw and place, or tied at the first pose.
-double squares_from(const std::vector<Stamped>& poses, size_t first, SE3 Stamped::*estimate, bool tied) {
-  std::vector<PosePair> pairs(poses.size());
-  for (size_t i = 0; i < poses.size(); ++i) {
-    pairs[i].estimate.T_frame_vehicle = poses[i].*estimate;
-    pairs[i].reference.T_frame_vehicle = poses[i].T_true;
-  }
-  const auto S = tied ? tie(pairs.front()) : align(pairs, Alignment::kYaw);
-  if (!S) throw std::runtime_error("the drive does not move");
-  double sum = 0.0;
-  for (size_t i = first; i < poses.size(); ++i)
-    sum += (S->T * pairs[i].estimate.T_frame_vehicle.p - poses[i].T_true.p).head<2>().squaredNorm();
-  return sum;
-}
-
-/// Sums of squared horizontal errors, m2: aligned, and tied at the first pose.
-struct SecondLap {
-  size_t poses = 0;
-  std::array<double, 2> open{}, closed{};
-
-  void add(const SecondLap& other) {
-    poses += other.poses;
-    for (size_t k = 0; k < open.size(); ++k) {
-      open[k] += other.open[k];
-      closed[k] += other.closed[k];
-    }
-  }
-};
-
 struct Totals {
   struct Relative {
     double place = 0.0, turn = 0.0;  ///< sums of NEES
@@ -242,12 +155,6 @@ struct Totals {
   int64_t poses = 0, pictures = 0;
   SecondLap laps;
 };
-
-void print(const SecondLap& lap) {
-  const auto rms = [&](double sum) { return std::sqrt(sum / static_cast<double>(std::max<size_t>(1, lap.poses))); };
-  std::printf("second laps: open %.4f m, closed %.4f m; tied at the first pose: open %.4f m, closed %.4f m\n",
-              rms(lap.open[0]), rms(lap.closed[0]), rms(lap.open[1]), rms(lap.closed[1]));
-}
 
 double degrees(double rad) { return rad * 180.0 / M_PI; }
 

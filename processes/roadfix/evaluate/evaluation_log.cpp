@@ -304,15 +304,14 @@ void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {
 
 void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const EvaluationLog& truth,
                       PoseStream& stream) {
-  MountingSeries::Mounting told{truth.calibration.q_vehicle_body(), Eigen::Vector3d::Zero()};
   const bool estimated = channel == "POSE_INS" || channel == "POSE_FUSED";
-  const bool learnt = estimated && !truth.facts.reference.mounting;
-  if (estimated && !learnt) {
-    const Eigen::Vector3d& angles = *truth.facts.reference.mounting;
-    told.q_vehicle_body = quaternion({angles.z(), angles.y(), angles.x()});
-  }
+  const std::optional<Eigen::Vector3d>& angles = truth.facts.reference.mounting;
+  const bool known = estimated && angles;
+  const MountingSeries::Mounting fixed{
+      known ? quaternion({angles->z(), angles->y(), angles->x()}) : truth.calibration.q_vehicle_body(),
+      Eigen::Vector3d::Zero()};
   for (Odometry& pose : stream.trajectory.poses) {
-    const MountingSeries::Mounting m = learnt ? log.mounting.at(pose.t_us, told.q_vehicle_body) : told;
+    const MountingSeries::Mounting m = estimated && !known ? log.mounting.at(pose.t_us, fixed.q_vehicle_body) : fixed;
     if (!m.q_vehicle_body.vec().isZero(0.0)) pose = in_axes(m.q_vehicle_body, pose);
     if (m.std.isZero(0.0)) continue;
     const Eigen::Matrix3d R = m.q_vehicle_body.conjugate().toRotationMatrix();

@@ -34,7 +34,7 @@ TEST_CASE("a common scale error grows with the distance from the given pose") {
   const Matrix6d cov =
       covariance.at_image(kKeyframe, kKeyframe.inverse() * T_map_now, T_map_now, errors, Matrix6d::Zero());
   CHECK(std::sqrt(ahead.dot(cov.topLeftCorner<3, 3>() * ahead)) == Approx(0.5));
-  CHECK(covariance.with_scales().isApprox(cov, 1e-12));
+  CHECK(covariance.with_considered().isApprox(cov, 1e-12));
 }
 
 TEST_CASE("a motion without images adds to the position and to the heading alone") {

@@ -233,7 +233,9 @@ TEST_CASE("systematic calibration errors are contained in the covariance", "[sta
   CHECK(nees < 1.7);
   // Teeth: the same errors with one of the two not configured.
   CHECK(test("length scale not configured", {sigmas.length, 0.0}, {0.0, sigmas.rotation}) > 50.0);
-  CHECK(test("rotation scale not configured", {0.0, sigmas.rotation}, {sigmas.length, 0.0}) > 1.5);
+  const double turns = 2.0 * sigmas.rotation;
+  CHECK(test("rotation scale configured", {0.0, turns}, {sigmas.length, turns}) < 1.7);
+  CHECK(test("rotation scale not configured", {0.0, turns}, {sigmas.length, 0.0}) > 2.0);
 }
 
 TEST_CASE("a turn that all tracks pretend is contained in the covariance", "[statistics]") {
