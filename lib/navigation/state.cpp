@@ -98,6 +98,7 @@ State::State(bool camera)
       carried_(P_.rows(), 0) {
   if (!camera) return;
   clones.reserve(kMaxClones);
+  points.reserve(kMaxPoints);
 }
 
 const Clone* State::find_clone(int64_t id) const {
@@ -110,6 +111,7 @@ void State::reset(const Mean& mean, const BaseVector& variance) {
   x = mean;
   p_ref = mean.nav.position;
   clones.clear();
+  points.clear();
   size_ = base_;
   P_.setZero();
   P_.diagonal().head(base_) = variance.head(base_);
@@ -132,7 +134,12 @@ void State::adopt(const State& other, const Mean& camera, const BaseVector& vari
 
 void State::drop_clones() {
   clones.clear();
+  points.clear();
   size_ = base_;
+}
+
+void State::drop_points() {
+  while (!points.empty()) remove_point(points.back().track);
 }
 
 void State::correct(const Eigen::Ref<const Eigen::VectorXd>& d) {
@@ -172,6 +179,7 @@ void State::retract(const Eigen::Ref<const Eigen::VectorXd>& d) {
     c.R = Eigen::Quaterniond(dR * c.R).normalized().toRotationMatrix();
     c.p = p_ref + dR * (c.p - p_ref) + part(d, c.at + 3);
   }
+  for (Point& p : points) p.f += part(d, p.at);
 }
 
 void State::subtract(const Eigen::Ref<const Eigen::MatrixXd>& Y) {
@@ -258,6 +266,50 @@ void State::erase(int at, int width) {
   size_ -= width;
   const auto moved = [&](int& a) { a = a > at ? a - width : a; };
   for (Clone& c : clones) moved(c.at);
+  for (Point& p : points) moved(p.at);
+}
+
+Point& State::add_point(int64_t track, int64_t anchor, const Eigen::Vector3d& f) {
+  return points.emplace_back(Point{track, anchor, grow(3), f});
+}
+
+void State::express(const Point& point, const Eigen::Ref<const Eigen::Matrix3Xd>& G, std::span<const StateBlock> blocks,
+                    const Eigen::Matrix3d& N) {
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxSize> rows(3, size_);
+  rows.setZero();
+  Eigen::Vector3d expected = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxSize> carried(3, carried_.cols());
+  carried.setZero();
+  int column = 0;
+  for (const auto& [at, width] : blocks) {
+    const auto own = G.middleCols(column, width);
+    rows.noalias() += own * P_.block(at, 0, width, size_);
+    expected += own * expected_.segment(at, width);
+    carried += own * carried_.middleRows(at, width);
+    column += width;
+  }
+  Eigen::Matrix3d own = N;
+  column = 0;
+  for (const auto& [at, width] : blocks) {
+    own.noalias() += rows.middleCols(at, width) * G.middleCols(column, width).transpose();
+    column += width;
+  }
+  P_.block(point.at, 0, 3, size_) = rows;
+  P_.block(0, point.at, size_, 3) = rows.transpose();
+  P_.block<3, 3>(point.at, point.at) = 0.5 * (own + own.transpose());
+  expected_.segment<3>(point.at) = expected;
+  carried_.middleRows<3>(point.at) = carried;
+}
+
+bool State::has_point(int64_t track) const {
+  return std::any_of(points.begin(), points.end(), [&](const Point& p) { return p.track == track; });
+}
+
+void State::remove_point(int64_t track) {
+  const auto found = std::find_if(points.begin(), points.end(), [&](const Point& p) { return p.track == track; });
+  const int at = found->at;
+  points.erase(found);
+  erase(at, 3);
 }
 
 void State::remove_clone(int64_t id) {
@@ -304,6 +356,7 @@ void State::digest(Digest& digest) const {
     digest.add(c.R);
     digest.add(c.p);
   }
+  for (const Point& p : points) digest.add(p.f);
   digest.add(Eigen::MatrixXd(P_.topLeftCorner(size_, size_)));
 }
 

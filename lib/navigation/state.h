@@ -1,4 +1,5 @@
-/// State of the navigation filter: means, one covariance, and the poses that come and go in it, (N.1) of MODEL.md.
+/// State of the navigation filter: means, one covariance, and the poses and points that come and go in it, (N.1) of
+/// MODEL.md.
 ///
 /// Frame level: enu at an anchor, or local (z up) before fixes tie it. Error of every pose (R, p), right-invariant
 /// about the reference point p_ref: R = Exp(phi) R_hat, p = p_ref + Exp(phi) (p_hat - p_ref) + rho, phi and rho in
@@ -7,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "geometry/se3.h"
@@ -16,6 +18,7 @@
 namespace roadfix::navigation {
 
 inline constexpr int kMaxClones = 17;
+inline constexpr int kMaxPoints = 32;
 
 using inertial::kAccelBias;
 using inertial::kAccelScale;
@@ -26,7 +29,7 @@ using inertial::kInertialSize;
 using inertial::kPos;
 using inertial::kVel;
 
-/// Where the error of what stands in the covariance, behind the inertial block. Clones follow.
+/// Where the error of what stands in the covariance, behind the inertial block. Clones and points follow.
 inline constexpr int kWheelScale = 21;        ///< measured speed over true speed, minus one
 inline constexpr int kMounting = 22;          ///< rad, pitch and yaw of the vehicle's axes in the imu's
 inline constexpr int kAxle = 24;              ///< m, imu axes: the point that does not slip
@@ -48,7 +51,7 @@ inline constexpr int kRightTurn = 54;     ///< rad, of the right camera against 
 inline constexpr int kTrackDrift = 57;    ///< rad/m, camera axes: a slow turn that all tracks pretend, (N.6.20)
 inline constexpr int kCameraOffset = 60;  ///< s: a picture stamped t was taken at t + offset on the imu's clock
 inline constexpr int kBaseSize = 61;
-inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones;
+inline constexpr int kMaxSize = kBaseSize + 6 * kMaxClones + 3 * kMaxPoints;
 
 using BaseVector = Eigen::Matrix<double, kBaseSize, 1>;
 /// An error of all states, without memory of its own to take.
@@ -105,6 +108,19 @@ struct Clone {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
 };
 
+/// A point of the scene that is measured as long as it is seen, (N.6.22).
+struct Point {
+  int64_t track = 0;
+  int64_t anchor = 0;  ///< id of the clone in whose left eye it lies at (alpha, beta, 1) / lambda
+  int at = 0;          ///< first index of its error, which is added
+  Eigen::Vector3d f = Eigen::Vector3d::Zero();  ///< alpha, beta, lambda (1/m)
+};
+
+/// A block of the covariance: `width` rows from `at` on.
+struct StateBlock {
+  int at = 0, width = 0;
+};
+
 class State {
  public:
   /// Without a camera the base block ends at kWithoutCamera and no pose can be added.
@@ -113,6 +129,7 @@ class State {
   Mean x;
   Eigen::Vector3d p_ref = Eigen::Vector3d::Zero();  ///< m, of the error; changed by move_reference() alone
   std::vector<Clone> clones;                        ///< ascending id
+  std::vector<Point> points;                        ///< in the order in which they came
 
   [[nodiscard]] bool has_camera() const { return base_ == kBaseSize; }
   [[nodiscard]] int base_size() const { return base_; }
@@ -125,13 +142,14 @@ class State {
   /// What a receiver brought back from an outage is not over, (N.5.2).
   [[nodiscard]] bool gnss_returns() const { return P_(kReturnRate, kReturnRate) > 0.0; }
 
-  /// Starts with these variances of the base block; poses are dropped, p_ref is the position.
+  /// Starts with these variances of the base block; poses and points are dropped, p_ref is the position.
   void reset(const Mean& mean, const BaseVector& variance);
   /// Becomes `other` without its camera, with the camera of `camera` known with these variances (those of the base block
   /// behind kWithoutCamera count).
   void adopt(const State& other, const Mean& camera, const BaseVector& variance);
-  /// Drops poses.
+  /// Drops poses and points.
   void drop_clones();
+  void drop_points();
 
   /// Adds the error d (size()) to every mean, (N.1.2).
   void retract(const Eigen::Ref<const Eigen::VectorXd>& d);
@@ -166,6 +184,14 @@ class State {
 
   /// Room for a block of `width` at the end, its rows and columns zero; its first index.
   int grow(int width);
+  /// The point's error becomes G d + n, d the errors of these blocks (its own among them or not), n of covariance N.
+  void express(const Point& point, const Eigen::Ref<const Eigen::Matrix3Xd>& G, std::span<const StateBlock> blocks,
+               const Eigen::Matrix3d& N);
+  /// The point becomes the last one; its error is zero until express().
+  Point& add_point(int64_t track, int64_t anchor, const Eigen::Vector3d& f);
+  void remove_point(int64_t track);
+  [[nodiscard]] bool has_point(int64_t track) const;
+  /// No point may have its anchor there.
   void remove_clone(int64_t id);
   /// Copies the pose as it is now; `rate`: rad/s, imu axes; stamps jitter by `jitter` s, (N.6.1).
   void add_clone(int64_t id, const Eigen::Vector3d& rate, double jitter);
@@ -189,12 +215,15 @@ class State {
 template <class Archive>
 void State::serialise(Archive& a) {
   x.serialise(a);
-  auto num_clones = static_cast<int64_t>(clones.size());
-  a(p_ref, size_, held_, num_clones);
-  if (num_clones < 0 || num_clones > kMaxClones || size_ != base_ + 6 * num_clones || size_ > P_.rows())
+  auto num_clones = static_cast<int64_t>(clones.size()), num_points = static_cast<int64_t>(points.size());
+  a(p_ref, size_, held_, num_clones, num_points);
+  if (num_clones < 0 || num_clones > kMaxClones || num_points < 0 || num_points > kMaxPoints ||
+      size_ != base_ + 6 * num_clones + 3 * num_points || size_ > P_.rows())
     throw std::runtime_error("state: impossible size of the covariance");
   clones.resize(static_cast<size_t>(num_clones));
   for (Clone& c : clones) a(c.id, c.t_us, c.at, c.R, c.p);
+  points.resize(static_cast<size_t>(num_points));
+  for (Point& p : points) a(p.track, p.anchor, p.at, p.f);
   for (int j = 0; j < size_; ++j) {
     a(expected_(j));
     for (int i = 0; i < size_; ++i) a(P_(i, j));

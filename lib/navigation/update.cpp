@@ -37,8 +37,14 @@ void Linear::expect(const State& state) {
 }
 
 Columns::Columns(const State& state) {
-  blocks_[count_++] = {kCameraTurn, kCamera};
-  for (const Clone& c : state.clones) blocks_[count_++] = {c.at, 6};
+  add({kCameraTurn, kCamera});
+  for (const Clone& c : state.clones) add({c.at, 6});
+  for (const Point& p : state.points) add({p.at, 3});
+}
+
+void Columns::add(const StateBlock& block) {
+  blocks_[count_++] = block;
+  size_ += block.width;
 }
 
 Update::Update()

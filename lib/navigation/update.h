@@ -63,24 +63,24 @@ class Linear {
   Eigen::Matrix<double, kMaxRows, 1> r_;
 };
 
-/// Columns of the state that a stack of rows depends on: the camera and every clone.
+/// Columns of the state that a stack of rows depends on: the camera, every clone and every point.
 class Columns {
  public:
-  struct Block {
-    int at = 0, width = 0;  ///< in the state
-  };
   static constexpr int kCamera = 15;  ///< turn, place, lens, right eye's turn, drift
-  static constexpr int kMost = kCamera + 6 * kMaxClones;
+  static constexpr int kMost = kCamera + 6 * kMaxClones + 3 * kMaxPoints;
 
   explicit Columns(const State& state);
-  [[nodiscard]] int size() const { return of_clone(count_ - 1); }
+  [[nodiscard]] int size() const { return size_; }
   /// First column of the clone with this index in state.clones.
   [[nodiscard]] static int of_clone(size_t index) { return kCamera + 6 * static_cast<int>(index); }
-  [[nodiscard]] std::span<const Block> blocks() const { return {blocks_.data(), count_}; }
+  [[nodiscard]] std::span<const StateBlock> blocks() const { return {blocks_.data(), count_}; }
 
  private:
-  std::array<Block, kMaxClones + 1> blocks_{};
+  void add(const StateBlock& block);
+
+  std::array<StateBlock, kMaxClones + kMaxPoints + 1> blocks_{};
   size_t count_ = 0;
+  int size_ = 0;
 };
 
 /// Collects rows and applies them at once; its memory is taken once.

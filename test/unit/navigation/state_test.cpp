@@ -93,7 +93,11 @@ TEST_CASE("updates and shrinking keep the covariance symmetric to the bit") {
       for (int i = 0; i < s.size(); ++i) Y(i, j) = random.number(0.01);
     s.subtract(Y);
     CHECK(symmetric(s));
+    (void)s.add_point(7, 3, random.vector(0.1));
     s.remove_clone(2);
+    CHECK(s.size() == kBaseSize + 21);
+    CHECK(s.points.front().at == kBaseSize + 18);
+    s.remove_point(7);
     CHECK(s.size() == kBaseSize + 18);
     CHECK(symmetric(s));
     CHECK(s.find_clone(2) == nullptr);
@@ -124,6 +128,7 @@ TEST_CASE("what tracks pretend decays in mean and correlations, and its variance
 TEST_CASE("a snapshot restores the state to the bit, and a wrong size is refused") {
   test::RandomNavigationState random(6);
   State s = random_state(random, 3);
+  (void)s.add_point(7, 3, random.vector(0.1));
   StateArchiveOut out;
   s.serialise(out);
   const std::vector<uint8_t> bytes = out.out.take();
@@ -132,6 +137,9 @@ TEST_CASE("a snapshot restores the state to the bit, and a wrong size is refused
   t.serialise(in);
   in.in.finish();
   CHECK(local(s.x, t.x, Eigen::Vector3d::Zero()).isZero(0.0));
+  REQUIRE(t.points.size() == 1);
+  CHECK(t.points.front().f == s.points.front().f);
+  CHECK(t.points.front().track == 7);
   CHECK(t.P().topLeftCorner(t.size(), t.size()) == s.P().topLeftCorner(s.size(), s.size()));
   State small(false);
   StateArchiveIn again{StateReader(bytes)};

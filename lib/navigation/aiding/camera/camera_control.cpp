@@ -54,7 +54,8 @@ CameraControl::CameraControl(const CameraTuning& tuning, const CameraFacts& fact
     : tuning_(tuning),
       left_(facts.left),
       stamps_(facts.rate, facts.stamp_jitter),
-      update_(tuning.tracks, tuning.tracks_per_update) {
+      update_(tuning.tracks, tuning.tracks_per_update + tuning.points),
+      points_(tuning.points, tuning.tracks.noise_factor) {
   if (facts.right) right_.emplace(*facts.right);
   window_.two_eyes = right_.has_value();
   chosen_.reserve(static_cast<size_t>(tuning.tracks_per_update));
@@ -161,7 +162,11 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing, Fi
   pose_us_ = t_us;
   tracks_.add(seen, state.clones.back().id);
   const bool full = static_cast<int>(state.clones.size()) > tuning_.poses;
-  choose_tracks(state, full);
+  // Rows along a point hold where nothing is far off.
+  const bool stay = !smoothing_ && course == nullptr && fitness_ == CameraFitness::kFit && !hardly_known(state);
+  if (!stay) points_.forget(state);
+  points_.see(state, tracks_);
+  choose_tracks(state, full, stay);
   try_tracks(state, course != nullptr ? &course->state() : nullptr);
   const bool iterated = !smoothing_ && hardly_known(state) &&
                         update_.counts().residual_sum > tuning_.iterate_above * update_.counts().dof_sum;
@@ -188,6 +193,7 @@ std::optional<AidingRecord> CameraControl::use(Filter& filter, bool standing, Fi
   } else if (fitness_ != CameraFitness::kFit) {
     record.status = AidingStatus::kBadQuality;
   }
+  points_.drop_refused(state);
   if (full) drop_oldest(state, course != nullptr ? &course->state() : nullptr);
   return counts.tried() > 0 ? std::optional(record) : std::nullopt;
 }
@@ -216,7 +222,7 @@ void CameraControl::add_pose(Filter& filter, int64_t id, int64_t t_us) const {
   state.carried().middleRows<3>(at) += dt * state.carried().middleRows<3>(kVel);
 }
 
-void CameraControl::choose_tracks(const State& state, bool full) {
+void CameraControl::choose_tracks(const State& state, bool full, bool stay) {
   chosen_.clear();
   const int64_t oldest = state.clones.front().id;
   const auto room = static_cast<size_t>(tuning_.tracks_per_update);
@@ -225,8 +231,10 @@ void CameraControl::choose_tracks(const State& state, bool full) {
     for (Track& track : tracks_.tracks()) {
       if (chosen_.size() >= room) break;
       const bool leaving = full && track.count > 0 && track.seen.front().clone == oldest;
-      if (track.count != wanted || (track.alive && !leaving)) continue;
+      if (track.count != wanted || (track.alive && !leaving) || state.has_point(track.track)) continue;
       ChosenTrack& chosen = chosen_.emplace_back();
+      chosen.track = track.track;
+      chosen.stays = stay && track.alive;
       chosen.count = static_cast<size_t>(track.count);
       for (size_t i = 0; i < chosen.count; ++i) {
         const Sighting& s = track.seen[i];
@@ -249,6 +257,7 @@ void CameraControl::try_tracks(const State& state, const State* course) {
     if (!window_.views.empty()) way += (p - window_.views.back().p).norm();
     window_.views.push_back({c.R, p, way});
   }
+  window_.points = static_cast<int>(state.points.size());
   const Columns columns(state);
   columns_of(state, columns, window_.P);
   window_.P_course.resize(0, 0);
@@ -260,12 +269,22 @@ void CameraControl::try_tracks(const State& state, const State* course) {
     row += height;
   }
   update_.begin(window_);
-  for (const ChosenTrack& track : chosen_) (void)update_.add({track.seen.data(), track.count});
+  points_.measure(state, update_);
+  for (const ChosenTrack& track : chosen_) {
+    const std::span<const ViewSighting> seen(track.seen.data(), track.count);
+    if (!track.stays || !points_.room(state)) {
+      (void)update_.add(seen);
+    } else if (const auto point = update_.place(seen)) {
+      points_.wait(track.track, *point);
+    }
+  }
 }
 
 bool CameraControl::apply(State& state) {
+  const Columns columns(state);
+  points_.join(state, columns);
   rows_.begin(state);
-  rows_.add(update_.rows(), Columns(state));
+  rows_.add(update_.rows(), columns);
   return rows_.apply(state);
 }
 
@@ -320,6 +339,7 @@ void CameraControl::judge(double dt_s) {
 
 void CameraControl::drop_oldest(State& state, State* course) {
   const int64_t oldest = state.clones.front().id;
+  points_.leave_clone(state, oldest);
   tracks_.forget_clone(oldest);
   state.remove_clone(oldest);
   if (course != nullptr) course->remove_clone(oldest);

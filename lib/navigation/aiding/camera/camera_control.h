@@ -9,6 +9,7 @@
 
 #include "navigation/aiding/camera/camera_facts.h"
 #include "navigation/aiding/camera/camera_tuning.h"
+#include "navigation/aiding/camera/scene_points.h"
 #include "navigation/aiding/camera/seen_picture.h"
 #include "navigation/aiding/camera/serialise_tracks.h"
 #include "navigation/aiding/camera/stamp_line.h"
@@ -83,8 +84,10 @@ class CameraControl {
     TrackPicture picture;
   };
 
-  /// A finished track, seen from the window's poses.
+  /// A finished track, or one that becomes a point, seen from the window's poses.
   struct ChosenTrack {
+    int64_t track = 0;
+    bool stays = false;
     size_t count = 0;
     std::array<ViewSighting, kMaxViews> seen;
   };
@@ -93,7 +96,7 @@ class CameraControl {
   const TimedPicture& pass_waiting();
   [[nodiscard]] bool makes_pose(const State& state, const SeenPicture& picture, int64_t t_us) const;
   void add_pose(Filter& filter, int64_t id, int64_t t_us) const;
-  void choose_tracks(const State& state, bool full);
+  void choose_tracks(const State& state, bool full, bool stay);
   void try_tracks(const State& state, const State* course = nullptr);
   [[nodiscard]] bool apply(State& state);
   [[nodiscard]] std::optional<State> iterate(const State& prior);
@@ -106,6 +109,7 @@ class CameraControl {
   StampLine stamps_;
   TrackStore tracks_;
   TrackUpdate update_;
+  ScenePoints points_;
   TrackWindow window_;
   std::vector<ChosenTrack> chosen_;
   Update rows_;

@@ -10,6 +10,8 @@ struct CameraTuning {
   /// rad, median of what tracks move between two of them besides the camera's turn, and s after which there is one all
   /// the same, (N.6.21)
   double pose_parallax = 0.06, pose_interval = 0.4;
+  /// That stay in the state while they are seen, at most: pays where tracks outlive the window, and nothing drives along.
+  int points = 0;
   int tracks_per_update = 40;  ///< finished tracks used at one time, longest first
   double unfit_above = 3.0;    ///< mean misfit of pictures, (N.6.14), that no good camera has
   double fit_below = 1.5;      ///< likewise, that a good one has
@@ -40,6 +42,7 @@ void visit(CameraTuning& c, Visitor& v) {
   v.integer("poses", c.poses, 4, 16);
   v.number("pose_parallax_rad", c.pose_parallax, 0.0, 1.0);
   v.number("pose_interval_s", c.pose_interval, 0.0, 1.0);
+  v.integer("points", c.points, 0, 32);
   v.integer("tracks_per_update", c.tracks_per_update, 5, 200);
   v.number("unfit_above", c.unfit_above, 1.0, 100.0);
   v.number("fit_below", c.fit_below, 0.5, 100.0);

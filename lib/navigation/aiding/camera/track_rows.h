@@ -6,12 +6,16 @@
 
 namespace roadfix::navigation {
 
-/// Columns of the errors that rows depend on: the camera's, then each view's (phi, rho).
+/// Of points that stay in the state.
+inline constexpr int kMaxPointColumns = 32;
+
+/// Columns of the errors that rows depend on: the camera's, then each view's (phi, rho), then each point's that stays.
 struct TrackColumns {
   static constexpr int kTurn = 0, kPlace = 3, kLens = 6, kRightTurn = 9, kDrift = 12;
   static constexpr int kCamera = 15;
-  static constexpr int kMost = kCamera + 6 * kMaxViews;
+  static constexpr int kMost = kCamera + 6 * kMaxViews + 3 * kMaxPointColumns;
   static constexpr int of_view(int view) { return kCamera + 6 * view; }
+  static constexpr int of_point(int views, int point) { return of_view(views) + 3 * point; }
 };
 
 /// At most 4 rows a sighting; three columns for the point, one for the residual.

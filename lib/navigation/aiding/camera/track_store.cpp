@@ -7,6 +7,17 @@
 
 namespace roadfix::navigation {
 
+namespace {
+
+bool is_before(const Track& t, int64_t wanted) { return t.track < wanted; }
+
+}  // namespace
+
+Track* TrackStore::find(int64_t track) {
+  const auto found = std::lower_bound(tracks_.begin(), tracks_.end(), track, is_before);
+  return found != tracks_.end() && found->track == track ? &*found : nullptr;
+}
+
 void TrackStore::pass(const SeenPicture& picture) {
   auto point = picture.points.begin();
   for (Track& track : tracks_) {
@@ -19,8 +30,7 @@ void TrackStore::pass(const SeenPicture& picture) {
 void TrackStore::add(const SeenPicture& picture, int64_t clone) {
   pass(picture);
   for (const SeenPoint& point : picture.points) {
-    auto place = std::lower_bound(tracks_.begin(), tracks_.end(), point.track,
-                                  [](const Track& t, int64_t wanted) { return t.track < wanted; });
+    auto place = std::lower_bound(tracks_.begin(), tracks_.end(), point.track, is_before);
     if (place == tracks_.end() || place->track != point.track) {
       if (tracks_.size() >= kMostTracks) continue;
       place = tracks_.insert(place, Track{});  // at the end: numbers ascend

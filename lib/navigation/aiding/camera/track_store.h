@@ -45,6 +45,12 @@ struct Track {
   [[nodiscard]] std::span<const Sighting> sightings() const { return {seen.data(), static_cast<size_t>(count)}; }
   /// Nothing of it can be used again.
   void use_up() { count = 0; }
+  /// Nor anything before its newest sighting, which was used.
+  void keep_newest() {
+    seen[0] = sightings().back();
+    seen[0].walk_px2 = 0.0;
+    count = 1;
+  }
 };
 
 class TrackStore {
@@ -61,6 +67,7 @@ class TrackStore {
   /// nothing where few are common.
   [[nodiscard]] std::optional<double> parallax(const SeenPicture& now, int64_t clone,
                                                const Eigen::Matrix3d& R_now_then) const;
+  [[nodiscard]] Track* find(int64_t track);
   /// Forgets what was seen from this clone.
   void forget_clone(int64_t clone);
   /// Drops tracks that have ended.

@@ -6,6 +6,13 @@
 
 namespace roadfix::navigation {
 
+namespace {
+
+// Of a point's distance: the window's way times the sigma of 1 / distance, below which rows along it hold.
+constexpr double kKnownDepth = 0.1;
+
+}  // namespace
+
 TrackUpdate::TrackUpdate(const TrackTuning& tuning, int most_tracks)
     : tuning_(tuning),
       work_(kMaxTrackRows, kTrackWidth),
@@ -44,8 +51,7 @@ TrackUpdate::Expected TrackUpdate::expected(int first_row, int rows, const Eigen
   return {r.squaredNorm(), spread};
 }
 
-bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
-  if (static_cast<int>(sightings.size()) < std::max(2, tuning_.min_sightings)) return false;
+void TrackUpdate::straighten(std::span<const ViewSighting> sightings) {
   for (size_t i = 0; i < sightings.size(); ++i) {
     straight_[i] = sightings[i];
     straight_[i].left.z = straightened(window_->camera, sightings[i].left.z);
@@ -53,6 +59,11 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
     straight_[i].walk_px2 *= tuning_.noise_factor * tuning_.noise_factor;
     straight_[i].right_sigma_px *= tuning_.noise_factor;
   }
+}
+
+bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
+  if (static_cast<int>(sightings.size()) < std::max(2, tuning_.min_sightings)) return false;
+  straighten(sightings);
   const std::span<const ViewSighting> seen(straight_.data(), sightings.size());
   const int anchor = seen.front().view;
   const auto f =
@@ -61,28 +72,70 @@ bool TrackUpdate::add(std::span<const ViewSighting> sightings) {
     ++counts_.not_placed;
     return false;
   }
+  placed_ = *f;
   const int n = window_->columns();
   auto work = work_.leftCols(3 + n + 1);
   const int rows = linearise_track(window_->camera, window_->views, seen, anchor, window_->two_eyes, *f, work);
-  if (window_->expected.size() > 0) work.col(3 + n).head(rows) -= work.block(0, 3, rows, n) * window_->expected.head(n);
   whiten_track(seen, window_->two_eyes, work.topRows(rows));
   eliminate_columns(work.topRows(rows), 3);
-  const int dof = rows - 3;
+  return keep(3, rows - 3);
+}
+
+/// (N.6.8) backwards, about the place where the track is now: what the point is from here on.
+std::optional<PlacedPoint> TrackUpdate::place(std::span<const ViewSighting> sightings) {
+  std::array<ViewSighting, kMaxViews> back;
+  const size_t count = sightings.size();
+  for (size_t i = 0; i < count; ++i) {
+    back[i] = sightings[count - 1 - i];
+    back[i].walk_px2 = i == 0 ? 0.0 : sightings[count - i].walk_px2;
+  }
+  if (!add({back.data(), count})) return std::nullopt;
+  const int n = window_->columns();
+  const auto T = work_.topLeftCorner<3, 3>().triangularView<Eigen::Upper>();
+  const double way = window_->views.back().way - window_->views.front().way;
+  if (!(way < kKnownDepth * std::abs(work_(2, 2)))) return std::nullopt;
+  PlacedPoint point;
+  point.by_errors = -work_.block(0, 3, 3, n);
+  T.solveInPlace(point.by_errors);
+  Eigen::Vector3d d = work_.col(3 + n).head<3>();
+  T.solveInPlace(d);
+  point.f = placed_ + d;
+  Eigen::Matrix3d root = Eigen::Matrix3d::Identity();
+  T.solveInPlace(root);
+  point.cov = root * root.transpose() / tracks_.back().weight;
+  return point;
+}
+
+bool TrackUpdate::add_sighting(int point, int anchor, const Eigen::Vector3d& f, const ViewSighting& sighting) {
+  straighten({&sighting, 1});
+  const std::span<const ViewSighting> seen(straight_.data(), 1);
+  auto work = work_.leftCols(3 + window_->columns() + 1);
+  const int rows = linearise_track(window_->camera, window_->views, seen, anchor, window_->two_eyes, f, work);
+  whiten_track(seen, window_->two_eyes, work.topRows(rows));
+  const int own = 3 + TrackColumns::of_point(static_cast<int>(window_->views.size()), point);
+  work.block(0, own, rows, 3) = work.topLeftCorner(rows, 3);
+  return keep(0, rows);
+}
+
+bool TrackUpdate::keep(int first_row, int rows) {
+  const int n = window_->columns();
+  auto work = work_.block(first_row, 3, rows, n + 1);
+  if (window_->expected.size() > 0) work.col(n) -= work.leftCols(n) * window_->expected.head(n);
   const bool by_course = window_->P_course.size() > 0;
   const auto [squared, spread] =
-      by_course ? expected(3, dof, window_->P_course, true) : expected(3, dof, window_->P, false);
-  misfits_.push_back(std::min(squared / dof, tuning_.refuse));
-  if (!by_course && !(squared <= tuning_.refuse * dof)) {
+      by_course ? expected(first_row, rows, window_->P_course, true) : expected(first_row, rows, window_->P, false);
+  misfits_.push_back(std::min(squared / rows, tuning_.refuse));
+  if (!by_course && !(squared <= tuning_.refuse * rows)) {
     ++counts_.refused;
     return false;
   }
   ++counts_.used;
   counts_.nis_sum += squared;
-  counts_.dof_sum += dof;
-  counts_.residual_sum += work.block(3, 3 + n, dof, 1).squaredNorm();
+  counts_.dof_sum += rows;
+  counts_.residual_sum += work.col(n).squaredNorm();
   const int first = tracks_.empty() ? 0 : tracks_.back().first + tracks_.back().rows;
-  kept_.block(first, 0, dof, n + 1) = work.block(3, 3, dof, n + 1);
-  tracks_.push_back({first, dof, weight(squared, dof), spread});
+  kept_.block(first, 0, rows, n + 1) = work;
+  tracks_.push_back({first, rows, weight(squared, rows), spread});
   return true;
 }
 

@@ -73,6 +73,24 @@ TEST_CASE("camera and imu claim what they are worth on tracks whose errors walk"
   CHECK(white.all.ratio() > 1.4);
 }
 
+TEST_CASE("points that stay tell what a window too short for their tracks does not, and claim it") {
+  CameraRun run;
+  run.tuning.poses = 4;
+  const Claims window = claims(20, run);
+  print("4 poses", window);
+  run.tuning.points = 32;
+  const Claims points = claims(20, run);
+  print("4 poses, 32 points", points);
+  CHECK(points.all.ratio() > 0.7);
+  CHECK(points.all.ratio() < 1.2);
+  CHECK(points.velocity_rms < 0.9 * window.velocity_rms);
+  run.walk_px = 0.0;
+  run.tuning.tracks.refuse = run.tuning.unfit_above = run.tuning.fit_below = 1e6;
+  const Claims white = claims(10, run);
+  print("4 poses, 32 points, taken for white", white);
+  CHECK(white.all.ratio() > 1.4);
+}
+
 TEST_CASE("a slow turn that all tracks pretend does not pass for the camera's own") {
   CameraRun run;
   run.drift = 1.5e-5;  // the roll that drawn pictures pretend, about every axis
