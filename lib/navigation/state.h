@@ -132,7 +132,6 @@ class State {
   std::vector<Point> points;                        ///< in the order in which they came
 
   [[nodiscard]] bool has_camera() const { return base_ == kBaseSize; }
-  [[nodiscard]] int base_size() const { return base_; }
   [[nodiscard]] int size() const { return size_; }
   /// The leading size() rows and columns count.
   [[nodiscard]] const Eigen::MatrixXd& P() const { return P_; }

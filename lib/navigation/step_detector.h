@@ -72,7 +72,6 @@ class StepDetector {
   /// What came in the last `seconds` is explained: watches anew, and knows of the antenna's place what it knew before.
   void begin_after(State& state, const BodyMotion& motion, double seconds);
   void stop() { watches_ = false; }
-  [[nodiscard]] bool watches() const { return watches_; }
   /// Often: the oldest moments are replaced by now. `displaced`: the receiver is known to be, and what it says
   /// tells nothing of where its antenna is.
   void advance(State& state, const BodyMotion& motion, bool displaced);

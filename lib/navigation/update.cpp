@@ -1,40 +1,6 @@
 #include "navigation/update.h"
 
-#include <cmath>
-#include <limits>
-
 namespace roadfix::navigation {
-
-double Linear::nis(const State& state) const {
-  Eigen::Matrix<double, kMaxColumns, kMaxColumns> P;
-  int row = 0;
-  for (int i = 0; i < blocks_; ++i) {
-    int column = 0;
-    for (int j = 0; j < blocks_; ++j) {
-      P.block(row, column, width(i), width(j)) = state.P().block(at(i), at(j), width(i), width(j));
-      column += width(j);
-    }
-    row += width(i);
-  }
-  Eigen::Matrix<double, kMaxRows, kMaxColumns> HP;
-  HP.topLeftCorner(rows_, columns_).noalias() = H().lazyProduct(P.topLeftCorner(columns_, columns_));
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, kMaxRows> S =
-      HP.topLeftCorner(rows_, columns_).lazyProduct(H().transpose());
-  S.diagonal().array() += 1.0;
-  const Eigen::LLT<decltype(S)> llt(S);
-  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxRows, 1> s = r();
-  llt.matrixL().solveInPlace(s);
-  return s.squaredNorm();
-}
-
-void Linear::expect(const State& state) {
-  int column = 0;
-  for (int k = 0; k < blocks_; ++k) {
-    r_.head(rows_) -= H_.block(0, column, rows_, width(k)) * state.expected().segment(at(k), width(k));
-    column += width(k);
-  }
-}
 
 Columns::Columns(const State& state) {
   add({kCameraTurn, kCamera});
@@ -54,16 +20,6 @@ void Update::begin(const State& state) {
   rows_ = 0;
   size_ = state.size();
   H_.setZero();
-}
-
-void Update::add(const Linear& rows) {
-  int column = 0;
-  for (int k = 0; k < rows.blocks(); ++k) {
-    H_.block(rows_, rows.at(k), rows.rows(), rows.width(k)) += rows.H().middleCols(column, rows.width(k));
-    column += rows.width(k);
-  }
-  r_.segment(rows_, rows.rows()) = rows.r();
-  rows_ += rows.rows();
 }
 
 void Update::add(const Eigen::Ref<const Eigen::MatrixXd>& stack, const Columns& columns) {

@@ -65,11 +65,6 @@ SE3 FrameTie::to_enu(const SE3& T_vo_vehicle) const {
   return {about_up(x_(kYaw)) * T_vo_vehicle.q, tied_position(x_, T_vo_vehicle.p - reference_)};
 }
 
-SE3 FrameTie::to_vo(const SE3& T_enu_vehicle) const {
-  const Eigen::Quaterniond q_vo_enu = about_up(-x_(kYaw));
-  return {q_vo_enu * T_enu_vehicle.q, reference_ + q_vo_enu * (T_enu_vehicle.p - x_.head<3>()) / scale()};
-}
-
 Eigen::Vector3d FrameTie::origin() const { return tied_position(x_, -reference_); }
 
 }  // namespace roadfix

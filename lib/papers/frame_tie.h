@@ -43,7 +43,6 @@ class FrameTie {
 
   [[nodiscard]] bool valid() const { return valid_; }
   [[nodiscard]] SE3 to_enu(const SE3& T_vo_vehicle) const;
-  [[nodiscard]] SE3 to_vo(const SE3& T_enu_vehicle) const;
   [[nodiscard]] double yaw() const { return x_(kYaw); }
   [[nodiscard]] double scale() const;            ///< ENU metres per visual metre
   [[nodiscard]] Eigen::Vector3d origin() const;  ///< of the visual frame, in ENU

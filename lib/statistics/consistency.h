@@ -26,7 +26,6 @@ class ConsistencyAccumulator {
   void add(double normalised_square, int dof);
 
   [[nodiscard]] int count() const { return count_; }
-  [[nodiscard]] int total_dof() const { return total_dof_; }
   /// Sum over total degrees of freedom: one where they are consistent, more where too small. Zero without samples.
   [[nodiscard]] double ratio() const;
   [[nodiscard]] Band band(double confidence = 0.999) const;

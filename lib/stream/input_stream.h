@@ -76,7 +76,6 @@ class InputStream {
   [[nodiscard]] std::optional<int64_t> run() const { return run_; }
   [[nodiscard]] std::optional<int64_t> clock_utime() const { return clock_.utime(); }
   [[nodiscard]] bool confirms_jump(int input, int64_t utime) const { return clock_.confirms_jump(input, utime); }
-  [[nodiscard]] std::optional<int> clock_input() const { return clock_.active_input(); }
   [[nodiscard]] std::optional<int64_t> horizon_utime() const { return horizon_; }
   /// Over all applied inputs, in order.
   [[nodiscard]] uint64_t input_digest() const { return digest_; }

@@ -23,7 +23,6 @@ class GnssVelocityControl {
 
   AidingRecord use(Filter& filter, const Queued& velocity);
   AidingRecord try_on(Filter& filter, const Queued& velocity) const;
-  [[nodiscard]] const SmoothingTime& smoothing() const { return smoothing_; }
   /// The way driven is broken: older velocities are not compared with newer ones.
   void forget_way() { models_.begin_anew(); }
 
