@@ -12,8 +12,7 @@ namespace roadfix::navigation {
 namespace {
 
 constexpr int kRounds = 5;
-constexpr int kLensRounds = 6;                // each leaves less than 2 c_r of the error
-constexpr double kLeastDistanceAhead = 0.05;  // of h.z, whose size is about one
+constexpr int kLensRounds = 6;  // each leaves less than 2 c_r of the error
 
 /// One sighting's eye, prepared for the iterations.
 struct Eye {

@@ -17,6 +17,8 @@ namespace roadfix::navigation {
 using Matrix2x3 = Eigen::Matrix<double, 2, 3>;
 
 inline constexpr int kMaxViews = 17;
+/// Of h.z, whose size is about one: nearer to the image plane no eye sees.
+inline constexpr double kLeastDistanceAhead = 0.05;
 
 /// The imu's pose when a picture was taken.
 struct ViewPose {

@@ -8,8 +8,6 @@ static_assert(kMaxPointColumns == kMaxPoints && kMaxViews == kMaxClones);
 
 namespace {
 
-constexpr double kLeastAhead = 0.05;  // of h.z, whose size is about one: nearer to the image plane no eye sees
-
 int view_of(const State& state, int64_t clone) {
   return static_cast<int>(state.find_clone(clone) - state.clones.data());
 }
@@ -77,7 +75,7 @@ void ScenePoints::leave_clone(State& state, int64_t clone) {
   for (size_t i = 0; i < state.points.size();) {
     Point& point = state.points[i];
     const Eigen::Vector3d h = view.direction(point.f);
-    if (point.anchor == clone && h.z() < kLeastAhead) {
+    if (point.anchor == clone && h.z() < kLeastDistanceAhead) {
       state.remove_point(point.track);
       continue;
     }
