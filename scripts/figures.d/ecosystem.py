@@ -1,7 +1,6 @@
 """ecosystem: Roadfix among other tools. Each part adds its rows to MEASUREMENTS below its functions."""
 import os
 import resource
-import shutil
 import subprocess
 import sys
 
@@ -24,18 +23,6 @@ print(os.path.getsize(sys.argv[1]) / statistics.median(read() for _ in range(5))
 """
 
 
-def python_with_numpy(runs):
-    """Debian's Python first, which python3-numpy belongs to."""
-    for program in ("/usr/bin/python3", shutil.which("python3")):
-        if program and os.path.exists(program):
-            try:
-                runs.call(program, "-c", "import numpy")
-                return program
-            except Skipped:
-                continue
-    raise Skipped("no Python with numpy (Debian: python3-numpy)")
-
-
 def long_log(runs, size):
     """The demo drive and what every stage makes of it, one after the other until there are so many bytes."""
 
@@ -56,8 +43,7 @@ def long_log(runs, size):
 
 def python_mb_s(runs):
     """A log of 200 MB into arrays by python/roadfix_log, from a warm cache."""
-    python = python_with_numpy(runs)
-    return float(runs.call("env", f"PYTHONPATH={runs.root / 'python'}", python, "-c", READ_ALL, long_log(runs, PYTHON_BYTES)))
+    return float(runs.python(READ_ALL, long_log(runs, PYTHON_BYTES)))
 
 
 def test_support(runs):

@@ -4,6 +4,7 @@ import bisect
 import csv
 import json
 import math
+import shutil
 import statistics
 
 from support import Skipped, root_mean_square
@@ -17,7 +18,9 @@ EARTH_RADIUS_M = 6378137.0
 LATENCIES_S = [0.05 * i for i in range(0, 31)]  # by which fixes are older than their stamps
 
 
-def mode_filter(vehicle):
+def mode_filter(imported, vehicle):
+    """The imported vehicle's folder stays as it is: others use it."""
+    shutil.copytree(imported, vehicle, dirs_exist_ok=True)
     (vehicle / "vo_tracker.yaml").write_text("mode: filter\n")
 
 
@@ -25,8 +28,9 @@ def replayed(runs, drive):
     """(rows of the exported poses, log, vehicle) of a drive of ../shared/data."""
 
     def run():
-        log, vehicle = runs.imported(drive)
-        mode_filter(vehicle)
+        log, imported = runs.imported(drive)
+        vehicle = runs.folder(drive, "msckf") / "vehicle"
+        mode_filter(imported, vehicle)
         if drive in UNCALIBRATED:
             runs.roadfix("calibrate", "camera-imu", log, "--config", vehicle)
         out = runs.folder(drive, "msckf") / "out.lcm"

@@ -1,6 +1,8 @@
 """What the measurements share: runs of the built programs, each done once however many rows use it."""
 import json
 import math
+import os
+import shutil
 import subprocess
 import time
 
@@ -72,12 +74,24 @@ class Runs:
         replace = ("--overwrite",) if writes and "--overwrite" not in arguments else ()
         return self.call(self.program("roadfix"), *arguments, *replace)
 
+    def python(self, code, *arguments):
+        """What `code` prints, with numpy and python/roadfix_log. Debian's Python first, which python3-numpy belongs to."""
+        for program in ("/usr/bin/python3", shutil.which("python3")):
+            if program and os.path.exists(program):
+                try:
+                    self.call(program, "-c", "import numpy")
+                except Skipped:
+                    continue
+                return self.call("env", f"PYTHONPATH={self.root / 'python'}", program, "-c", code, *arguments)
+        raise Skipped("no Python with numpy (Debian: python3-numpy)")
+
     def imported(self, drive):
         """(log, vehicle folder) of a drive of ../shared/data."""
 
         def run():
             folder = self.folder(drive)
             log, vehicle = folder / "drive.lcm", folder / "vehicle"
+            shutil.rmtree(vehicle, ignore_errors=True)
             self.roadfix("import", self.drive(drive), "--out", log, "--vehicle", vehicle, "--overwrite")
             return log, vehicle
 
