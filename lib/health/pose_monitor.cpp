@@ -118,6 +118,8 @@ void PoseMonitor::check(int64_t now_us, bool judged, std::vector<Condition>& out
     check_covariance(judged, out);
     if (o.validity == Validity::kCoasting && judged)
       out.push_back(condition("coasting", Verdict::kDegraded, "is coasting" + why));
+    else if (!newest_->anchor && judged)
+      out.push_back(condition("local", Verdict::kDegraded, "is in a local frame" + why));
   }
   if (jumps_.within(now_us) > 0)
     out.push_back(condition("jump", severity, fmt::format("jumped by {:.1f} m without saying so", jump_m_)));

@@ -132,7 +132,7 @@ struct StartConfig {
   double confirm_probability = 0.999;
   double confirm_std = 0.052;  ///< rad
   /// rad, of a heading that is sought: known better, the pose is published. With 0.26 that is 4 s after a start in motion;
-  /// but a tracker begins its own heading from it, and keeps the error.
+  /// but a tracker takes speed and level from it then, whose errors its map keeps.
   double rough_std = 0.052;
   double coasting_s = 3.0;         ///< s without position, velocity or standstill: coasting
   double invalid_sigma_m = 100.0;  ///< horizontal; more is no position

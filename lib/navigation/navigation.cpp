@@ -12,13 +12,20 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kRealignGap = 10.0;    // s without samples; longer starts over
+constexpr double kRealignGap = 10.0;  // s without samples; longer starts over
+constexpr char kUnaligned[] = "a local frame, until the heading is known";
 constexpr double kPredictorSpan = 1.0;  // s that one transition of the output covariance may cover
 
 /// No measurement: roads are level but for `sigma` rad, (N.2.9).
 AidingRecord use_road_level(Filter& filter, double sigma) {
   const State& state = filter.state();
   return filter.fuse(AidingSource::kNonholonomic, state.x.t_us, road_level(state, sigma), Gates::open().nis[2]);
+}
+
+/// Counted of the imu's pose, published of the vehicle's.
+SE3 published_jump(const SE3& jump, const Mean& x) {
+  const Eigen::Quaterniond q_imu_vehicle = exp_q(Eigen::Vector3d(0.0, x.mounting.x(), x.mounting.y()));
+  return {q_imu_vehicle.conjugate() * jump.q * q_imu_vehicle, jump.p};
 }
 
 }  // namespace
@@ -32,7 +39,15 @@ Navigation::Navigation(const NavigationConfig& config, bool has_imu)
       measurements_(config_),
       frame_(config_),
       start_(config_),
-      aiding_(config_) {}
+      aiding_(config_) {
+  seek_alignment();
+}
+
+void Navigation::seek_alignment() {
+  if (aiding_.camera() == nullptr || !has_imu() || !config_.sources.any_gnss()) return;
+  unaligned_ = std::make_unique<Navigation>(without_gnss(config_));
+  unaligned_published_ = false;
+}
 
 /// Begins anew with the other source of motion; what is known of the place and of an earlier drive stays.
 void Navigation::change_motion(bool has_imu) {
@@ -63,11 +78,13 @@ InputStatus Navigation::see(int64_t t_us) { return has_imu() ? InputStatus::kBad
 
 InputStatus Navigation::see(const ImuSample& imu) {
   if (!has_imu() && MotionInput::plausible(imu)) change_motion(true);
+  if (unaligned_) (void)unaligned_->see(imu);
   return motion_.see(imu);
 }
 
 InputStatus Navigation::advance(const ImuSample& imu) {
   const InputStatus status = imu.t_us > motion_.newest_us() ? see(imu) : InputStatus::kAccepted;
+  if (unaligned_) unaligned_->advance_to(imu.t_us);
   advance_to(imu.t_us);
   return status;
 }
@@ -82,13 +99,17 @@ void Navigation::take(const GnssFix& fix, int64_t id) {
   AidingStatus status = measurements_.screen(fix, others_tell ? filter()->state().x.nav.velocity.norm() : 0.0);
   if (!config_.sources.any_gnss()) status = AidingStatus::kDisabled;
   if (status != AidingStatus::kAccepted) return log_.add(record_of(AidingSource::kGnssPosition, status, fix.t_us), id);
-  if (frame_.local() && start_.gives_way_to_fixes(filter(), fix.t_us)) begin_again();
+  if (frame_.local() && start_.gives_way_to_fixes(filter(), fix.t_us)) {
+    begin_again();
+    if (!unaligned_) seek_alignment();
+  }
   measurements_.add(fix, id, frame_.anchor_for(fix));
   start_.add(fix);
 }
 
 void Navigation::add(const WheelSample& wheels, int64_t id) {
   take(wheels, id);
+  if (unaligned_) unaligned_->take(wheels, id);
   if (!has_imu()) advance_to(wheels.t_us);
 }
 
@@ -108,6 +129,9 @@ void Navigation::add(const MagSample& mag, int64_t id) {
 
 void Navigation::add(const TrackPicture& picture, int64_t id) {
   if (CameraControl* camera = aiding_.camera()) camera->add(picture, id);
+  if (!unaligned_) return;
+  camera_sees_ = camera_sees_ || !picture.tracks.empty();
+  unaligned_->add(picture, id);
 }
 
 void Navigation::add(const PriorPose& told, int64_t id) {
@@ -311,7 +335,36 @@ const Filter* Navigation::filter() const {
   return start_.phase() == Phase::kHeading ? &start_.hypotheses().leader() : nullptr;
 }
 
+void Navigation::clear_records() {
+  log_.clear_records();
+  if (unaligned_) unaligned_->log_.clear_records();
+}
+
 NavigationOutput Navigation::output() {
+  NavigationOutput out = own_output();
+  if (!unaligned_) return out;
+  NavigationOutput local = unaligned_->own_output();
+  if (out.odometry.validity == Validity::kInvalid) {
+    // Without a fix yet this one may begin locally itself, or where it was parked.
+    if (local.odometry.validity == Validity::kInvalid || !camera_sees_ || !frame_.anchor()) return out;
+    resets_.resume(local.imu.T_frame_vehicle);
+    unaligned_published_ = true;
+    local.phase = out.phase;
+    if (local.reason.empty()) local.reason = kUnaligned;
+    if (local.reset_counter == 0) local.reset_delta = published_jump(resets_.delta(), unaligned_->filter()->state().x);
+    local.reset_counter += resets_.counter();
+    return local;
+  }
+  if (out.local && start_.gives_way_to_fixes(filter(), motion_.newest_us())) return out;
+  if (unaligned_published_) {
+    resets_.go_on(unaligned_->resets_);
+    resets_.count(local.imu.T_frame_vehicle, out.imu.T_frame_vehicle);
+  }
+  unaligned_.reset();
+  return own_output();
+}
+
+NavigationOutput Navigation::own_output() {
   NavigationOutput out;
   out.phase = start_.phase();
   out.local = frame_.local();
@@ -325,10 +378,7 @@ NavigationOutput Navigation::output() {
   predict_output();
   out.imu = output_.output();
   out.odometry = output_.in_vehicle_axes(out.imu, config_.facts);
-  // Counted of the imu's pose, published of the vehicle's.
-  const Eigen::Vector2d& m = filter()->state().x.mounting;
-  const Eigen::Quaterniond q_imu_vehicle = exp_q(Eigen::Vector3d(0.0, m.x(), m.y()));
-  out.reset_delta.q = q_imu_vehicle.conjugate() * out.reset_delta.q * q_imu_vehicle;
+  out.reset_delta = published_jump(resets_.delta(), filter()->state().x);
   report().judge(out);
   out.imu.validity = out.odometry.validity;
   return out;
@@ -373,6 +423,10 @@ void Navigation::serialise(Archive& a) {
       [&](Filter& f) { f.serialise(a); });
   output_.serialise(a, earth);
   resets_.serialise(a);
+  bool seeks = unaligned_ != nullptr;
+  a(seeks, unaligned_published_, camera_sees_);
+  if (!seeks) unaligned_.reset();
+  if (unaligned_) unaligned_->serialise(a);
 }
 
 std::vector<uint8_t> Navigation::save() const {

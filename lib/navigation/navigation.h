@@ -13,6 +13,7 @@
 /// Guarantees: same inputs in the same order give the same bits; no allocation once aligned; one thread.
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "navigation/output_predictor.h"
@@ -37,13 +38,14 @@ class Navigation {
   /// Used as soon as there is a state; of a local frame it makes enu at once.
   void add(const PriorPose& told, int64_t id = 0);
 
-  /// Nothing before the first fix, and in a local frame.
+  /// Of enu; nothing before the first fix, and in a local frame that fixes have to tie.
   [[nodiscard]] std::optional<Geodetic> anchor() const { return frame_.anchor(); }
   /// What an earlier drive left, before the first start of this one; later it changes nothing.
   void recall(const Memory& memory);
   /// What this drive leaves to the next; nothing until aligned.
   [[nodiscard]] std::optional<Memory> memory() const;
 
+  /// Until fixes have told the heading, where a camera is: in a local frame.
   [[nodiscard]] NavigationOutput output();
   [[nodiscard]] NavigationStatus status() const { return report().status(filter()); }
   /// Filter in use (the leading hypothesis while aligning); nothing before alignment starts.
@@ -52,7 +54,7 @@ class Navigation {
   [[nodiscard]] const CameraControl* camera() const { return aiding_.camera(); }
   /// What was tried since the last call to clear_records().
   [[nodiscard]] const std::vector<AidingRecord>& records() const { return log_.records(); }
-  void clear_records() { log_.clear_records(); }
+  void clear_records();
 
   /// Everything that later outputs depend on; load() throws std::runtime_error on bytes that are no such state.
   [[nodiscard]] std::vector<uint8_t> save() const;
@@ -65,6 +67,7 @@ class Navigation {
   void take(const GnssFix& fix, int64_t id);
   void take(const WheelSample& wheels, int64_t id);
 
+  void seek_alignment();
   void advance_to(int64_t horizon_us);
   void step(const MotionInput::Step& now);
   void initialise(const MotionInput::Step& now);
@@ -76,6 +79,7 @@ class Navigation {
   bool tie_frame(const Queued& q);
   void use_prior_pose();
   void predict_output();
+  [[nodiscard]] NavigationOutput own_output();
 
   void run_leader();
   void begin_running();
@@ -98,6 +102,10 @@ class Navigation {
   std::optional<Filter> filter_;  ///< that runs
   OutputPredictor output_;
   PoseResets resets_;
+  /// Without the receiver, in a local frame, while it seeks the heading; nothing without a camera.
+  std::unique_ptr<Navigation> unaligned_;
+  bool unaligned_published_ = false;
+  bool camera_sees_ = false;  ///< a picture had tracks: a camera that sees nothing changes no pose
 };
 
 }  // namespace roadfix::navigation

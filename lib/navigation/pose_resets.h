@@ -14,22 +14,24 @@ inline SE3 pose_of(const Mean& x) { return {x.nav.q_level_imu, x.nav.position}; 
 
 class PoseResets {
  public:
-  void count(const SE3& before, const Mean& after) {
+  void count(const SE3& before, const SE3& after) {
     ++counter_;
-    delta_.p = after.nav.position - before.p;
-    delta_.q = before.q.conjugate() * after.nav.q_level_imu;
+    delta_.p = after.p - before.p;
+    delta_.q = before.q.conjugate() * after.q;
     abandoned_.reset();
   }
+  void count(const SE3& before, const Mean& after) { count(before, pose_of(after)); }
   /// The filter whose pose this is was given up.
   void abandon(const SE3& pose) { abandoned_ = pose; }
   [[nodiscard]] bool pending() const { return abandoned_.has_value(); }
   /// The pose is published again: a jump, where a filter was given up.
-  void resume(const Mean& now) {
+  void resume(const SE3& now) {
     if (abandoned_) count(*abandoned_, now);
   }
-  /// Goes on counting where `other` is.
+  void resume(const Mean& now) { resume(pose_of(now)); }
+  /// Those of `other`, whose poses were published until now, count too.
   void go_on(const PoseResets& other) {
-    counter_ = other.counter_;
+    counter_ += other.counter_;
     delta_ = other.delta_;
   }
 

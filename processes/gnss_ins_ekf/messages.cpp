@@ -108,7 +108,8 @@ int32_t aided_by(int sources) {
 }
 
 int8_t pose_state(const navigation::NavigationOutput& output) {
-  if (output.odometry.validity == Validity::kValid) return pose_t::STATE_RUNNING;
+  if (output.odometry.validity == Validity::kValid)
+    return output.local && output.phase != navigation::Phase::kDone ? pose_t::STATE_ALIGNING : pose_t::STATE_RUNNING;
   if (output.odometry.validity == Validity::kCoasting) return pose_t::STATE_WEAK;
   if (output.phase == navigation::Phase::kDone) return pose_t::STATE_LOST;
   return output.phase == navigation::Phase::kWaiting ? pose_t::STATE_WAITING : pose_t::STATE_ALIGNING;
@@ -150,7 +151,7 @@ PriorPose prior_pose(const pose_t& m) {
 void fill_ins_pose(const navigation::NavigationOutput& output, const std::optional<Geodetic>& anchor, pose_t& pose) {
   fill_pose(output.odometry, pose);
   pose.frame = output.local ? pose_t::FRAME_LOCAL : pose_t::FRAME_ENU;
-  if (anchor) {
+  if (anchor && !output.local) {
     pose.anchor_lat_deg = anchor->latitude / kDegree;
     pose.anchor_lon_deg = anchor->longitude / kDegree;
     pose.anchor_height_m = anchor->height;

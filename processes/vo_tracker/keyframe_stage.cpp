@@ -76,7 +76,10 @@ void KeyframeStage::apply(const Message& m) {
     const auto speed = wheel_speed(wheel_sample(decode<wheels_t>(m.bytes)), calibration_.sensors.wheels);
     if (speed) tracker_->speed(*speed);
   } else if (m.input == ins_) {
-    const Odometry ins = odometry(decode<pose_t>(m.bytes));
+    const auto pose = decode<pose_t>(m.bytes);
+    // Valid in a local frame until fixes have told the heading: what moves it are the tracks of this tracker.
+    if (pose.state == pose_t::STATE_ALIGNING) return;
+    const Odometry ins = odometry(pose);
     if (const auto speed = ins_speed(ins)) tracker_->speed(*speed);
     if (const auto level = ins_level(ins, mounting_)) tracker_->add_attitude(*level);
   } else if (m.input == ins_status_) {

@@ -31,6 +31,14 @@ StartState local_start(const LocalContext& c) {
 
 }  // namespace
 
+NavigationConfig without_gnss(NavigationConfig config) {
+  config.sources.gnss_position = config.sources.gnss_velocity = config.sources.gnss_heading = false;
+  VehicleFacts& v = config.facts;
+  v.has_receiver = false;
+  v.position_latency_std = v.velocity_latency_std = v.time_offset_std = 0.0;  // the imu's stamps are the clock
+  return config;
+}
+
 bool LocalContext::sees_rest() const {
   if (wheel_speed) return std::abs(*wheel_speed) < kRestSpeed;
   return flow_px && *flow_px < still_flow_px;

@@ -8,6 +8,9 @@
 
 namespace roadfix::navigation {
 
+/// The configuration of the same car for a filter that has no receiver, and needs not wait for one.
+NavigationConfig without_gnss(NavigationConfig config);
+
 /// What these strategies see besides the imu.
 struct LocalContext {
   const NavigationConfig& config;

@@ -27,7 +27,7 @@ double reported(SmallCar& car, const std::string& channel, const Change& change,
 
 }  // namespace
 
-TEST_CASE("an invalid judged pose is not to be used, a coasting one is degraded") {
+TEST_CASE("an invalid judged pose is not to be used, a coasting one is degraded, and so is one in a local frame") {
   SmallCar car;
   const Change invalid = [](PoseFacts& f) {
     f.odometry.validity = Validity::kInvalid;
@@ -42,6 +42,10 @@ TEST_CASE("an invalid judged pose is not to be used, a coasting one is degraded"
   CHECK(coasting.health.verdict() == Verdict::kDegraded);
   coasting.drive(kMended, kMended + 1.0);
   CHECK(coasting.health.verdict() == Verdict::kOk);
+  SmallCar nowhere;
+  const Change local = [](PoseFacts& f) { f.anchor.reset(); };
+  CHECK(reported(nowhere, "POSE_FUSED", local, "pose.POSE_FUSED.local") <= kFault + 0.3);
+  CHECK(nowhere.health.verdict() == Verdict::kDegraded);
 }
 
 TEST_CASE("an estimate that is not judged and invalid degrades, one that never worked does nothing") {
