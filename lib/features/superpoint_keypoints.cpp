@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "features/network.h"
@@ -19,7 +20,8 @@ class SuperPoint final : public KeypointDetector {
         descriptors_(index_of("output_desc")) {}
 
   Keypoints detect(const cv::Mat& gray) override {
-    const cv::Mat small = network_input(gray, config_.superpoint_scale, kNetworkCell);
+    const double scale = std::sqrt(config_.superpoint_pixels / static_cast<double>(gray.total()));
+    const cv::Mat small = network_input(gray, std::min(1.0, scale), kNetworkCell);
     const std::vector<cv::Mat> outputs = network_.run(small);
     const cv::Mat &detection = outputs[detection_], &descriptors = outputs[descriptors_];
     const int rows = small.rows / kNetworkCell, cols = small.cols / kNetworkCell;

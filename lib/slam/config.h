@@ -32,8 +32,10 @@ struct KeyframeTrackerConfig {
   /// Degrees of freedom of Student's t distribution of the sigmas of tracks: smaller values for more variation. On
   /// rendered streets a quarter of the tracks has errors below 0.12 px, a quarter above 0.46 px.
   double track_freedom = 3.0;
-  double gate_px = 2.0;   ///< reprojection error above which an observation is an outlier
-  double drift = 8.0e-6;  ///< rad/m, sigma of a turn about the camera's x and z that all tracks pretend, (S.10.4)
+  double gate_px = 2.0;  ///< reprojection error above which an observation is an outlier
+  /// rad/m, sigma of a turn about the camera's x and z that all tracks pretend, (S.10.4): of patches and SIFT; keypoints
+  /// of FAST and of networks pretend twice as much.
+  double drift = 8.0e-6;
   // Prior sigmas of the calibration correction; zero: calibration fixed.
   double focal_std = 0.01;           ///< relative
   double radial_std = 0.02;          ///< coefficient of r^2 remaining after undistortion

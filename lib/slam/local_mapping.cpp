@@ -12,6 +12,14 @@ namespace {
 
 constexpr double kRandomWalkFactor = 3.0;  ///< variance of a random walk at its end over that of its mean
 constexpr double kMinScaleDistance = 3.0;  ///< m, distance required before speeds set the scale of a map
+constexpr double kKeypointDrift = 2.0;     ///< of FAST and of networks, over that of patches and SIFT (EVIDENCE.md)
+
+/// rad/m, (S.10.4)
+double drift_of(const KeyframeTrackerConfig& config) {
+  const FrontEndKind kind = config.front_end.kind;
+  const bool lasting = kind == FrontEndKind::kKlt || kind == FrontEndKind::kSift;
+  return (lasting ? 1.0 : kKeypointDrift) * config.drift;
+}
 
 }  // namespace
 
@@ -19,7 +27,7 @@ LocalMapping::LocalMapping(const KeyframeTrackerConfig& config, const CameraRig&
                            std::unique_ptr<RightImageMatcher> matcher, Executor& executor)
     : rig_(rig),
       bundle_iterations_(config.bundle_iterations),
-      drift_(config.drift),
+      drift_(drift_of(config)),
       left_(rig.left),
       right_(rig.right.value_or(rig.left)),
       matcher_(std::move(matcher)),

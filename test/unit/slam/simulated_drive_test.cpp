@@ -74,6 +74,7 @@ struct Calibrated {
   double sharpness = 1.0;                                      ///< of the bend
   Eigen::Vector3d turn_radpm = Eigen::Vector3d::Zero();        ///< that all tracks pretend, camera axes
   double drift_radpm = 0.0;                                    ///< configured
+  FrontEndKind kind = FrontEndKind::kKlt;                      ///< that the tracks are said to be of
 };
 
 Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calibrated) {
@@ -111,6 +112,7 @@ Drive drive(uint64_t seed, bool stereo, double noise_px, const Calibrated& calib
   config.focal_std = calibrated.focal_std;
   config.radial_std = 0.0;  // exactly known
   config.drift = calibrated.drift_radpm;
+  config.front_end.kind = calibrated.kind;
   config.right_turn_std_deg = calibrated.right_turn_std_deg;
   config.right_decentring_std = calibrated.right_decentring_std;
   const auto seen = std::make_shared<test::SeenTracks>();
@@ -240,13 +242,14 @@ TEST_CASE("systematic calibration errors are contained in the covariance", "[sta
 
 TEST_CASE("a turn that all tracks pretend is contained in the covariance", "[statistics]") {
   constexpr double kDrift = 5.0e-5;  // rad/m, more than pictures have: the drives are short
-  const auto nees = [&](double configured) {
+  const auto nees = [&](double configured, FrontEndKind kind = FrontEndKind::kKlt) {
     const auto drawn = [=](int seed) {
       std::mt19937 random(static_cast<unsigned>(2000 + seed));
       std::normal_distribution<double> normal;
       Calibrated calibrated;
       calibrated.turn_radpm = {kDrift * normal(random), 0.0, kDrift * normal(random)};
       calibrated.drift_radpm = configured;
+      calibrated.kind = kind;
       return calibrated;
     };
     const Drives d = drives_of(10, false, 0.3, drawn);
@@ -257,6 +260,8 @@ TEST_CASE("a turn that all tracks pretend is contained in the covariance", "[sta
   CHECK(claimed > 0.5);
   CHECK(claimed < 1.7);
   CHECK(nees(0.0) > 3.0);  // teeth
+  // Keypoints of ORB pretend twice as much as is configured.
+  CHECK(nees(0.5 * kDrift, FrontEndKind::kOrb) == claimed);
 }
 
 /// What accumulates from one image to a later one, in the later one's axes.
