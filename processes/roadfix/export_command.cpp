@@ -81,6 +81,7 @@ void run_export(const ExportOptions& options) {
   const EvaluationLog log = read_evaluation_log(options.log, {options.channel});
   for (const std::string& note : log.notes) say("export", note);
   const PoseStream& stream = poses_of(log, options.channel, options.log);
+  if (const std::string note = left_out(options.channel, stream); !note.empty()) say("export", note);
   std::ostringstream text;
   write(text, stream, options, log.calibration);
   write_text_file(options.out.path, text.str());

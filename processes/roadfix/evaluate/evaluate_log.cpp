@@ -36,11 +36,7 @@ EstimateInput estimate_input(const std::string& channel, PoseStream stream, cons
   input.lever_arm = lever_arm_between(stream.origin, reference.origin, truth.calibration, report.notes);
   input.latencies = std::move(stream.latencies);
   input.trajectory = std::move(stream.trajectory);
-  if (stream.backward + stream.other_frame > 0) {
-    report.notes.push_back(
-        fmt::format("{}: {} poses for a time that has one already and {} in another frame are left out", channel,
-                    stream.backward, stream.other_frame));
-  }
+  if (std::string note = left_out(channel, stream); !note.empty()) report.notes.push_back(std::move(note));
   return input;
 }
 

@@ -302,6 +302,12 @@ void move_to_anchor(PoseStream& stream, const Geodetic& anchor) {
   stream.anchor = anchor;
 }
 
+std::string left_out(const std::string& channel, const PoseStream& stream) {
+  if (stream.backward + stream.other_frame == 0) return {};
+  return fmt::format("{}: {} poses for a time that has one already and {} in another frame are left out", channel,
+                     stream.backward, stream.other_frame);
+}
+
 void turn_to_imu_axes(const std::string& channel, const EvaluationLog& log, const EvaluationLog& truth,
                       PoseStream& stream) {
   const bool estimated = channel == "POSE_INS" || channel == "POSE_FUSED";

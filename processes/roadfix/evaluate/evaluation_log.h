@@ -58,6 +58,9 @@ const PoseStream& poses_of(const EvaluationLog& log, const std::string& channel,
 /// The stream in another ENU frame; a local stream stays as it is.
 void move_to_anchor(PoseStream& stream, const Geodetic& anchor);
 
+/// A note on the poses that are in the log and not in the stream; empty where there are none.
+std::string left_out(const std::string& channel, const PoseStream& stream);
+
 /// Poses of the vehicle's axes turned into the imu's, those of references and calibrations. The navigation filter has
 /// estimated the turn between them (POSE_FUSED repeats it): the truth's where `truth` tells it, else what was learnt, whose
 /// doubt is added to the pose's claim as if the two were independent. The others have the calibration's.

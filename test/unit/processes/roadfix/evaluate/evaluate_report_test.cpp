@@ -248,6 +248,9 @@ TEST_CASE("a repeated stretch, a change of frame and bytes that are no message a
   const PoseStream& stream = log.poses.at("POSE_VO");
   CHECK(stream.backward == 5001);
   CHECK(stream.other_frame == 200);
+  CHECK(left_out("POSE_VO", stream) ==
+        "POSE_VO: 5001 poses for a time that has one already and 200 in another frame are left out");
+  CHECK(left_out("REFERENCE", log.poses.at("REFERENCE")).empty());
   CHECK(stream.trajectory.poses.size() == 5001 - 200);
   CHECK(stream.reasons.size() == stream.trajectory.poses.size());
   REQUIRE(log.notes.size() == 1);
