@@ -108,10 +108,11 @@ int32_t aided_by(int sources) {
 }
 
 int8_t pose_state(const navigation::NavigationOutput& output) {
-  if (output.odometry.validity == Validity::kValid)
-    return output.local && output.phase != navigation::Phase::kDone ? pose_t::STATE_ALIGNING : pose_t::STATE_RUNNING;
+  const bool seeks_heading = output.phase != navigation::Phase::kDone;
+  if (output.odometry.validity != Validity::kInvalid && output.local && seeks_heading) return pose_t::STATE_ALIGNING;
+  if (output.odometry.validity == Validity::kValid) return pose_t::STATE_RUNNING;
   if (output.odometry.validity == Validity::kCoasting) return pose_t::STATE_WEAK;
-  if (output.phase == navigation::Phase::kDone) return pose_t::STATE_LOST;
+  if (!seeks_heading) return pose_t::STATE_LOST;
   return output.phase == navigation::Phase::kWaiting ? pose_t::STATE_WAITING : pose_t::STATE_ALIGNING;
 }
 
