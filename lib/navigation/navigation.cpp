@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "geometry/so3.h"
 #include "navigation/input_adapter.h"
 #include "navigation/motion/road_level.h"
 #include "stream/state_bytes.h"
@@ -12,20 +11,13 @@ namespace roadfix::navigation {
 
 namespace {
 
-constexpr double kRealignGap = 10.0;  // s without samples; longer starts over
-constexpr char kUnaligned[] = "a local frame, until the heading is known";
+constexpr double kRealignGap = 10.0;    // s without samples; longer starts over
 constexpr double kPredictorSpan = 1.0;  // s that one transition of the output covariance may cover
 
 /// No measurement: roads are level but for `sigma` rad, (N.2.9).
 AidingRecord use_road_level(Filter& filter, double sigma) {
   const State& state = filter.state();
   return filter.fuse(AidingSource::kNonholonomic, state.x.t_us, road_level(state, sigma), Gates::open().nis[2]);
-}
-
-/// Counted of the imu's pose, published of the vehicle's.
-SE3 published_jump(const SE3& jump, const Mean& x) {
-  const Eigen::Quaterniond q_imu_vehicle = exp_q(Eigen::Vector3d(0.0, x.mounting.x(), x.mounting.y()));
-  return {q_imu_vehicle.conjugate() * jump.q * q_imu_vehicle, jump.p};
 }
 
 }  // namespace
@@ -40,13 +32,7 @@ Navigation::Navigation(const NavigationConfig& config, bool has_imu)
       frame_(config_),
       start_(config_),
       aiding_(config_) {
-  seek_alignment();
-}
-
-void Navigation::seek_alignment() {
-  if (aiding_.camera() == nullptr || !has_imu() || !config_.sources.any_gnss()) return;
-  unaligned_ = std::make_unique<Navigation>(without_gnss(config_));
-  unaligned_published_ = false;
+  unaligned_.begin(config_);
 }
 
 /// Begins anew with the other source of motion; what is known of the place and of an earlier drive stays.
@@ -78,13 +64,13 @@ InputStatus Navigation::see(int64_t t_us) { return has_imu() ? InputStatus::kBad
 
 InputStatus Navigation::see(const ImuSample& imu) {
   if (!has_imu() && MotionInput::plausible(imu)) change_motion(true);
-  if (unaligned_) (void)unaligned_->see(imu);
+  unaligned_.see(imu);
   return motion_.see(imu);
 }
 
 InputStatus Navigation::advance(const ImuSample& imu) {
   const InputStatus status = imu.t_us > motion_.newest_us() ? see(imu) : InputStatus::kAccepted;
-  if (unaligned_) unaligned_->advance_to(imu.t_us);
+  unaligned_.advance(imu);
   advance_to(imu.t_us);
   return status;
 }
@@ -101,7 +87,7 @@ void Navigation::take(const GnssFix& fix, int64_t id) {
   if (status != AidingStatus::kAccepted) return log_.add(record_of(AidingSource::kGnssPosition, status, fix.t_us), id);
   if (frame_.local() && start_.gives_way_to_fixes(filter(), fix.t_us)) {
     begin_again();
-    if (!unaligned_) seek_alignment();
+    if (!unaligned_.runs()) unaligned_.begin(config_);
   }
   measurements_.add(fix, id, frame_.anchor_for(fix));
   start_.add(fix);
@@ -109,7 +95,7 @@ void Navigation::take(const GnssFix& fix, int64_t id) {
 
 void Navigation::add(const WheelSample& wheels, int64_t id) {
   take(wheels, id);
-  if (unaligned_) unaligned_->take(wheels, id);
+  unaligned_.add(wheels, id);
   if (!has_imu()) advance_to(wheels.t_us);
 }
 
@@ -129,9 +115,7 @@ void Navigation::add(const MagSample& mag, int64_t id) {
 
 void Navigation::add(const TrackPicture& picture, int64_t id) {
   if (CameraControl* camera = aiding_.camera()) camera->add(picture, id);
-  if (!unaligned_) return;
-  camera_sees_ = camera_sees_ || !picture.tracks.empty();
-  unaligned_->add(picture, id);
+  unaligned_.add(picture, id);
 }
 
 void Navigation::add(const PriorPose& told, int64_t id) {
@@ -337,30 +321,17 @@ const Filter* Navigation::filter() const {
 
 void Navigation::clear_records() {
   log_.clear_records();
-  if (unaligned_) unaligned_->log_.clear_records();
+  unaligned_.clear_records();
 }
 
 NavigationOutput Navigation::output() {
-  NavigationOutput out = own_output();
-  if (!unaligned_) return out;
-  NavigationOutput local = unaligned_->own_output();
-  if (out.odometry.validity == Validity::kInvalid) {
-    // Without a fix yet this one may begin locally itself, or where it was parked.
-    if (local.odometry.validity == Validity::kInvalid || !camera_sees_ || !frame_.anchor()) return out;
-    resets_.resume(local.imu.T_frame_vehicle);
-    unaligned_published_ = true;
-    local.phase = out.phase;
-    if (local.reason.empty()) local.reason = kUnaligned;
-    if (local.reset_counter == 0) local.reset_delta = published_jump(resets_.delta(), unaligned_->filter()->state().x);
-    local.reset_counter += resets_.counter();
-    return local;
-  }
-  if (out.local && start_.gives_way_to_fixes(filter(), motion_.newest_us())) return out;
-  if (unaligned_published_) {
-    resets_.go_on(unaligned_->resets_);
-    resets_.count(local.imu.T_frame_vehicle, out.imu.T_frame_vehicle);
-  }
-  unaligned_.reset();
+  NavigationOutput own = own_output();
+  if (!unaligned_.runs()) return own;
+  // Without a fix yet this one may begin locally itself, or where it was parked.
+  if (own.odometry.validity == Validity::kInvalid)
+    return frame_.anchor() ? unaligned_.speak_for(std::move(own), resets_) : own;
+  if (own.local && start_.gives_way_to_fixes(filter(), motion_.newest_us())) return own;
+  unaligned_.end(own.imu.T_frame_vehicle, resets_);
   return own_output();
 }
 
@@ -378,7 +349,7 @@ NavigationOutput Navigation::own_output() {
   predict_output();
   out.imu = output_.output();
   out.odometry = output_.in_vehicle_axes(out.imu, config_.facts);
-  out.reset_delta = published_jump(resets_.delta(), filter()->state().x);
+  out.reset_delta = resets_.published_delta(filter()->state().x);
   report().judge(out);
   out.imu.validity = out.odometry.validity;
   return out;
@@ -423,10 +394,7 @@ void Navigation::serialise(Archive& a) {
       [&](Filter& f) { f.serialise(a); });
   output_.serialise(a, earth);
   resets_.serialise(a);
-  bool seeks = unaligned_ != nullptr;
-  a(seeks, unaligned_published_, camera_sees_);
-  if (!seeks) unaligned_.reset();
-  if (unaligned_) unaligned_->serialise(a);
+  unaligned_.serialise(a);
 }
 
 std::vector<uint8_t> Navigation::save() const {

@@ -13,12 +13,12 @@
 /// Guarantees: same inputs in the same order give the same bits; no allocation once aligned; one thread.
 #pragma once
 
-#include <memory>
 #include <span>
 
 #include "navigation/output_predictor.h"
 #include "navigation/pose_resets.h"
 #include "navigation/status.h"
+#include "navigation/unaligned_navigation.h"
 
 namespace roadfix::navigation {
 
@@ -67,7 +67,6 @@ class Navigation {
   void take(const GnssFix& fix, int64_t id);
   void take(const WheelSample& wheels, int64_t id);
 
-  void seek_alignment();
   void advance_to(int64_t horizon_us);
   void step(const MotionInput::Step& now);
   void initialise(const MotionInput::Step& now);
@@ -102,10 +101,7 @@ class Navigation {
   std::optional<Filter> filter_;  ///< that runs
   OutputPredictor output_;
   PoseResets resets_;
-  /// Without the receiver, in a local frame, while it seeks the heading; nothing without a camera.
-  std::unique_ptr<Navigation> unaligned_;
-  bool unaligned_published_ = false;
-  bool camera_sees_ = false;  ///< a picture had tracks: a camera that sees nothing changes no pose
+  UnalignedNavigation unaligned_;  ///< speaks while this one seeks the heading
 };
 
 }  // namespace roadfix::navigation

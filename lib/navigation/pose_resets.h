@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "geometry/so3.h"
 #include "navigation/serialise_optional.h"
 #include "navigation/state.h"
 
@@ -34,10 +35,17 @@ class PoseResets {
     counter_ += other.counter_;
     delta_ = other.delta_;
   }
+  /// So many jumps of poses that were published until now; another one follows.
+  void go_on(int jumps) { counter_ += jumps; }
 
   [[nodiscard]] int counter() const { return counter_; }
   /// p new minus old; q_old^-1 q_new.
   [[nodiscard]] const SE3& delta() const { return delta_; }
+  /// The same of the vehicle's axes.
+  [[nodiscard]] SE3 published_delta(const Mean& x) const {
+    const Eigen::Quaterniond q_imu_vehicle = exp_q(Eigen::Vector3d(0.0, x.mounting.x(), x.mounting.y()));
+    return {q_imu_vehicle.conjugate() * delta_.q * q_imu_vehicle, delta_.p};
+  }
 
   template <class Archive>
   void serialise(Archive& a) {

@@ -45,7 +45,7 @@ class GnssInsStage final : public Stage {
         {"MAG", "mag_t", 50'000, 0}, {"START_GNSS_INS_EKF", "state_t", 0, 0}, {"PRIOR_POSE", "pose_t", 250'000, 0}};
     if (filter_config_.sources.camera && filter_config_.facts.camera)
       spec_.inputs.push_back({"VO_FEATURES", "vo_features2_t", kTracksLateness_us, 0});
-    spec_.state_layout = 40;
+    spec_.state_layout = 41;
     // A car without an IMU is driven by its wheels.
     spec_.clocks = {{kImu, 200'000}, {kWheels, 500'000}};
     spec_.outputs = {{"POSE_INS", "pose_t"}, {"INS_STATUS", "ins_status_t"}, {"AIDING_INS", "aiding_t"}};

@@ -6,54 +6,14 @@
 #include "geometry/euler.h"
 #include "geometry/frames.h"
 #include "geometry/so3.h"
+#include "local_run.h"
 #include "navigation/navigation.h"
-#include "simulation/scenarios.h"
-#include "support/track_drive.h"
 
 using namespace roadfix;
 using namespace roadfix::navigation;
 using namespace roadfix::test;
 
 namespace {
-
-struct Run {
-  std::string scenario = "city_loop";
-  double from_s = 0.0, until_s = 60.0;
-  int eyes = 1;
-  bool wheels = true, pictures = true;
-  double gyro_bias = 0.0;  ///< rad/s, more about z than the calibration says
-};
-
-NavigationConfig config_of(const TrackDrive& d, const Run& run) {
-  const ScenarioConfig& s = d.drive.config;
-  NavigationConfig c;
-  c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = false;
-  c.sources.wheel_speed = run.wheels;
-  VehicleFacts& v = c.facts;
-  v.imu = {s.imu.gyro_noise_radps_per_rthz, s.imu.accel_noise_mps2_per_rthz};
-  v.gyro_bias_std = s.imu.gyro_bias_std_radps;
-  v.accel_bias_std = s.imu.accel_bias_std_mps2;
-  v.scale_std = s.imu.gyro_scale_std;
-  v.correlation_s = 1e6;
-  v.wheels.speed_noise = s.wheels.speed_noise_mps;
-  v.wheel_scale_std = 0.01;
-  v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);
-  v.p_imu_axle_std.setConstant(0.05);
-  if (run.eyes == 0) return c;
-  CameraFacts& camera = v.camera.emplace();
-  camera.left = d.rig.camera.intrinsics();
-  if (run.eyes == 2) camera.right = camera.left;
-  camera.T_imu_camera = SE3{Eigen::Quaterniond::Identity(), s.imu.position_m}.inverse() * d.T_vehicle_left;
-  camera.T_left_right = d.T_left_right;
-  return c;
-}
-
-TrackPicture picture_of(const TrackFrame& frame, bool two_eyes) {
-  TrackPicture p{frame.t_us, {}};
-  for (const TrackObservation& o : frame.tracks)
-    p.tracks.push_back({o.id, o.left, two_eyes ? o.right : std::nullopt, 0.1, 0.15, 0.2});
-  return p;
-}
 
 struct Outcome {
   double first_s = -1.0;              ///< after from_s
@@ -63,7 +23,7 @@ struct Outcome {
   std::string waits_for;
 };
 
-Outcome run(const TrackDrive& d, const Run& r) {
+Outcome run(const TrackDrive& d, const LocalRun& r) {
   Navigation filter(config_of(d, r));
   const int64_t start = d.drive.imu.front().t_us + std::llround(1e6 * r.from_s);
   const int64_t end = d.drive.imu.front().t_us + std::llround(1e6 * r.until_s);
@@ -106,16 +66,6 @@ Outcome run(const TrackDrive& d, const Run& r) {
   }
   out.waits_for = filter.status().waits_for;
   return out;
-}
-
-const TrackDrive& city() {
-  static const TrackDrive kDrive = [] {
-    ScenarioConfig s = scenario("city_loop");
-    s.duration_s = 60.0;
-    s.faults.clear();
-    return make_track_drive(s, 1, with_noise_of_pictures({}));
-  }();
-  return kDrive;
 }
 
 double share(const char* name, const Outcome& o) {
@@ -250,131 +200,6 @@ TEST_CASE("a local frame becomes enu when fixes come, without losing a pose") {
     fix.velocity->enu *= 1.5;
   };
   CHECK(tied(20.0, 2, stretched).tied_s < 0.0);
-}
-
-namespace {
-
-struct Aligned {
-  double first_s = -1.0, enu_s = -1.0;      ///< after the first sample: any valid pose, the first in enu
-  int invalid_between = 0;                  ///< poses
-  int resets = 0;                           ///< counted from the first valid pose to the first in enu
-  double missed_m = 0.0, missed_rad = 0.0;  ///< by which the reset says otherwise than the poses beside it
-  double local_m = 0.0, local_way_m = 0.0;  ///< of the way in the local frame: what its length misses, and the true one
-  int compared = 0;                         ///< poses, with one that goes on from a snapshot
-  bool same_bits = true;                    ///< of those
-};
-
-/// City drive, of which all before from_s is missing, beside a receiver that knows where it is by 10 m once a second and no
-/// velocity, from fixes_s on; `receiver`: the calibration has it. A snapshot is taken `snapshot_s` after the first valid pose.
-Aligned aligned(double from_s, double fixes_s, int eyes, double snapshot_s = -1.0, bool receiver = true) {
-  const TrackDrive& d = city();
-  NavigationConfig c = config_of(d, {.eyes = eyes, .wheels = false});
-  c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = true;
-  c.facts.has_receiver = receiver;
-  c.facts.p_imu_antenna = d.drive.config.gnss.lever_arm_m - d.drive.config.imu.position_m;
-  Navigation filter(c);
-  std::optional<Navigation> resumed;
-  const int64_t start = d.drive.imu.front().t_us + std::llround(1e6 * from_s);
-  int64_t fix_us = 0;
-  Aligned out;
-  NavigationOutput before;
-  std::optional<SE3> first, first_true;
-  for (const DriveEvent& e : d.events) {
-    const int64_t t_us = stamp_of(e);
-    const double t = seconds_between(start, t_us);
-    if (t < 0.0) continue;
-    const auto each = [&](const auto& use) {
-      use(filter);
-      if (resumed) use(*resumed);
-    };
-    if (const auto* given = std::get_if<GnssFix>(&e);
-        given != nullptr && t >= fixes_s && seconds_between(fix_us, t_us) > 0.95) {
-      GnssFix fix = *given;
-      fix.velocity.reset();
-      fix.cov_enu = 100.0 * Eigen::Matrix3d::Identity();
-      fix_us = t_us;
-      each([&](Navigation& f) { f.add(fix); });
-    }
-    if (const auto* frame = std::get_if<TrackFrame>(&e); frame != nullptr && eyes > 0)
-      each([&](Navigation& f) { f.add(picture_of(*frame, eyes == 2)); });
-    const auto* imu = std::get_if<ImuSample>(&e);
-    if (imu == nullptr) continue;
-    each([&](Navigation& f) {
-      (void)f.advance(*imu);
-      f.clear_records();
-    });
-    const NavigationOutput o = filter.output();
-    if (resumed) {
-      const NavigationOutput again = resumed->output();
-      ++out.compared;
-      out.same_bits = out.same_bits && again.odometry.T_frame_vehicle.p == o.odometry.T_frame_vehicle.p &&
-                      again.local == o.local && again.reset_counter == o.reset_counter;
-    }
-    const bool valid = o.odometry.validity != Validity::kInvalid;
-    out.invalid_between += first && !valid ? 1 : 0;
-    if (!valid) continue;
-    const SE3 T = o.imu.T_frame_vehicle, truth = d.drive.truth_at(t_us).T_frame_vehicle;
-    if (!first) {
-      first = T;
-      first_true = truth;
-      out.first_s = t;
-      out.resets = -o.reset_counter;
-    }
-    if (snapshot_s >= 0.0 && !resumed && t > out.first_s + snapshot_s) resumed.emplace(c).load(filter.save());
-    if (o.local) {
-      out.local_way_m = (truth.p - first_true->p).norm();
-      out.local_m = std::abs((T.p - first->p).norm() - out.local_way_m);
-      before = o;
-      continue;
-    }
-    out.enu_s = t;
-    out.resets += o.reset_counter;
-    if (before.local) {
-      out.missed_m = (T.p - before.imu.T_frame_vehicle.p - o.reset_delta.p).norm();
-      const Eigen::Quaterniond turned = before.odometry.T_frame_vehicle.q * o.reset_delta.q;
-      out.missed_rad = turned.angularDistance(o.odometry.T_frame_vehicle.q);
-    }
-    break;
-  }
-  return out;
-}
-
-}  // namespace
-
-TEST_CASE("until fixes have told the heading a camera holds a local frame, and one reset leads out of it") {
-  for (const double from_s : {0.0, 20.0}) {
-    for (const int eyes : {0, 1, 2}) {
-      const Aligned a = aligned(from_s, 0.0, eyes);
-      std::printf("from %.0f s, eyes %d: first %.2f s, enu %.2f s, %.2f of %.0f m, reset off by %.3f m %.4f rad\n",
-                  from_s, eyes, a.first_s, a.enu_s, a.local_m, a.local_way_m, a.missed_m, a.missed_rad);
-      REQUIRE(a.enu_s > 5.0);
-      if (eyes == 0) {
-        CHECK(a.first_s == a.enu_s);
-        continue;
-      }
-      CHECK(a.first_s < 3.5);
-      CHECK(a.invalid_between == 0);
-      CHECK(a.resets == 1);
-      CHECK(a.local_m < 0.1 * a.local_way_m + 0.1);
-      CHECK(a.missed_m < 0.3);
-      CHECK(a.missed_rad < 0.02);
-    }
-  }
-}
-
-TEST_CASE(
-    "fixes that come to a resting car's local frame leave it without a pose for no longer than a new start takes") {
-  const Aligned a = aligned(0.0, 0.7, 1, -1.0, false);
-  std::printf("first %.2f s, enu %.2f s, %d without a pose\n", a.first_s, a.enu_s, a.invalid_between);
-  CHECK(a.first_s < 0.7);
-  CHECK(a.enu_s > 5.0);
-  CHECK(a.invalid_between < 200);
-}
-
-TEST_CASE("while it seeks its heading it goes on from a snapshot to the same bits") {
-  const Aligned a = aligned(20.0, 0.0, 1, 1.0);
-  CHECK(a.compared > 500);
-  CHECK(a.same_bits);
 }
 
 namespace {
