@@ -3,6 +3,7 @@
 #include "geometry/euler.h"
 #include "geometry/so3.h"
 #include "simulation/random.h"
+#include "support/imu_facts.h"
 
 namespace roadfix::test {
 
@@ -98,11 +99,7 @@ navigation::NavigationConfig filter_config(const VisualDriveConfig& config) {
   c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = c.sources.magnetic_heading = false;
   const ScenarioConfig& s = config.scenario;
   navigation::VehicleFacts& v = c.facts;
-  v.imu = {s.imu.gyro_noise_radps_per_rthz, s.imu.accel_noise_mps2_per_rthz};
-  v.gyro_bias_std = s.imu.gyro_bias_std_radps;
-  v.accel_bias_std = s.imu.accel_bias_std_mps2;
-  v.scale_std = s.imu.gyro_scale_std;
-  v.correlation_s = 1e6;
+  tell_imu(s, v);
   v.wheel_scale_std = s.wheels.speed_scale_std;
   v.wheels.speed_noise = s.wheels.speed_noise_mps;
   v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);

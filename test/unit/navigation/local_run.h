@@ -4,6 +4,7 @@
 #include "navigation/config.h"
 #include "navigation/navigation.h"
 #include "simulation/scenarios.h"
+#include "support/imu_facts.h"
 #include "support/track_drive.h"
 
 namespace roadfix::test {
@@ -21,11 +22,7 @@ inline navigation::NavigationConfig config_of(const TrackDrive& d, const LocalRu
   c.sources.gnss_position = c.sources.gnss_velocity = c.sources.gnss_heading = false;
   c.sources.wheel_speed = run.wheels;
   navigation::VehicleFacts& v = c.facts;
-  v.imu = {s.imu.gyro_noise_radps_per_rthz, s.imu.accel_noise_mps2_per_rthz};
-  v.gyro_bias_std = s.imu.gyro_bias_std_radps;
-  v.accel_bias_std = s.imu.accel_bias_std_mps2;
-  v.scale_std = s.imu.gyro_scale_std;
-  v.correlation_s = 1e6;
+  tell_imu(s, v);
   v.wheels.speed_noise = s.wheels.speed_noise_mps;
   v.wheel_scale_std = 0.01;
   v.mounting_std = s.imu.mounting_std_rad.cwiseMax(1e-3);

@@ -8,6 +8,7 @@
 #include "geometry/so3.h"
 #include "navigation/aiding/camera/camera_control.h"
 #include "simulation/random.h"
+#include "support/imu_facts.h"
 #include "support/track_drive.h"
 
 namespace roadfix::test {
@@ -89,12 +90,7 @@ class PretendedTurn {
 
 inline navigation::NavigationConfig facts_of(const TrackDrive& d) {
   navigation::NavigationConfig c;
-  const ImuConfig& imu = d.drive.config.imu;
-  c.facts.imu = {imu.gyro_noise_radps_per_rthz, imu.accel_noise_mps2_per_rthz};
-  c.facts.gyro_bias_std = imu.gyro_bias_std_radps;
-  c.facts.accel_bias_std = imu.accel_bias_std_mps2;
-  c.facts.scale_std = imu.gyro_scale_std;
-  c.facts.correlation_s = 1e6;
+  tell_imu(d.drive.config, c.facts);
   return c;
 }
 
